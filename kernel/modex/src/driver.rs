@@ -1,0 +1,346 @@
+//! The driver: mode set, pages, erasing, flips.
+
+use core::fmt;
+
+use crate::registers::*;
+use crate::{
+    Bus, Column, Destination, HEIGHT, PAGE_BYTES, PAGES, PLANE_BYTES, Purpose, STRIDE, WIDTH,
+};
+
+/// A colour of the DAC: red, green, blue, 0 to 63 each.
+pub type Rgb6 = [u8; 3];
+/// The DAC's 256 entries.
+pub type Palette = [Rgb6; 256];
+
+/// Polls of Input Status 1 before the card is called dead: seconds, where a frame takes 17 ms.
+const POLLS: u32 = 10_000_000;
+
+/// Bytes of one wide store, and lines of bookkeeping: a group is 8 bytes, 32 pixels, of a line.
+const GROUP_BYTES: usize = 8;
+const GROUPS: usize = STRIDE / GROUP_BYTES;
+const GROUP_PIXELS: u16 = 4 * GROUP_BYTES as u16;
+
+/// A register that did not read back as it was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Readback {
+    /// The block, by its datasheet name.
+    pub block: &'static str,
+    /// The register's index in the block.
+    pub index: u8,
+    /// What the mode's table says.
+    pub expected: u8,
+    /// What the card says.
+    pub actual: u8,
+}
+
+impl fmt::Display for Readback {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            block,
+            index,
+            expected,
+            actual,
+        } = self;
+        write!(
+            f,
+            "{block} register {index:02X} reads {actual:02X} after {expected:02X} was written"
+        )
+    }
+}
+
+/// What a page was drawn on since it last held the bare background: for each group of 32
+/// pixel columns the lines `top..bottom`.
+#[derive(Clone, Copy, Debug)]
+struct Drawn {
+    top: [u16; GROUPS],
+    bottom: [u16; GROUPS],
+}
+
+impl Drawn {
+    const NOTHING: Self = Self {
+        top: [HEIGHT as u16; GROUPS],
+        bottom: [0; GROUPS],
+    };
+    const EVERYTHING: Self = Self {
+        top: [0; GROUPS],
+        bottom: [HEIGHT as u16; GROUPS],
+    };
+
+    fn add(&mut self, x: u16, y: u16, len: u16) {
+        let group = usize::from(x / GROUP_PIXELS);
+        self.top[group] = self.top[group].min(y);
+        self.bottom[group] = self.bottom[group].max(y + len);
+    }
+}
+
+/// The card in Mode X, with its three pages.
+///
+/// Pages rotate. A page is drawn on only when the card can't be showing it any more: the CRTC
+/// takes a new start address over at the retrace, so until a retrace was seen both the old page
+/// and the new one may be on the screen.
+#[derive(Debug)]
+pub struct ModeX<B> {
+    bus: B,
+    drawn: [Drawn; PAGES],
+    /// The page whose start address the CRTC was given last.
+    front: usize,
+    /// The page that is or was last drawn on.
+    back: usize,
+    /// Pages that may be on the screen: `front`, and those flipped away from since a retrace
+    /// was last seen.
+    visible: [bool; PAGES],
+}
+
+impl<B: Bus> ModeX<B> {
+    /// Sets the mode, reads it back, loads the palette and clears all four planes; page 0 is
+    /// shown.
+    ///
+    /// # Errors
+    /// The first register that reads back wrong.
+    pub fn set(mut bus: B, palette: &Palette) -> Result<Self, Readback> {
+        bus.purpose(Purpose::Setup);
+        disable_dispi(&mut bus);
+        write_mode(&mut bus, &MODE_X);
+        check_mode(&mut bus, &MODE_X)?;
+        write_palette(&mut bus, palette);
+        let mut card = Self {
+            bus,
+            drawn: [Drawn::EVERYTHING; PAGES],
+            front: 0,
+            back: 0,
+            visible: [true, false, false],
+        };
+        for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
+            card.bus.store64(at as u16, 0);
+        }
+        let clocking = MODE_X.sequencer[usize::from(CLOCKING_MODE)];
+        write(&mut card.bus, SEQUENCER, CLOCKING_MODE, clocking);
+        Ok(card)
+    }
+
+    /// The page after the one drawn last, on its bare background: `background[y]` is the
+    /// colour of line y. Waits for a retrace first if that page may still be on the screen.
+    ///
+    /// Only what the page was drawn on is restored, in wide stores to all planes at once.
+    pub fn begin(&mut self, background: &[u8; HEIGHT]) -> Canvas<'_, B> {
+        self.back = (self.back + 1) % PAGES;
+        if self.visible[self.back] {
+            self.settle();
+        }
+        self.bus.purpose(Purpose::Erase);
+        write(&mut self.bus, SEQUENCER, MAP_MASK, ALL_PLANES);
+        let drawn = core::mem::replace(&mut self.drawn[self.back], Drawn::NOTHING);
+        for group in 0..GROUPS {
+            for y in drawn.top[group]..drawn.bottom[group] {
+                let at = page_start(self.back) + usize::from(y) * STRIDE + group * GROUP_BYTES;
+                let colour = background[usize::from(y)];
+                self.bus.store64(at as u16, u64::from_ne_bytes([colour; 8]));
+            }
+        }
+        self.bus.purpose(Purpose::Draw);
+        Canvas {
+            page_start: page_start(self.back),
+            drawn: &mut self.drawn[self.back],
+            bus: &mut self.bus,
+        }
+    }
+
+    /// Shows the page drawn last, from the next retrace on.
+    ///
+    /// The start address is written while the card displays, so that the retrace which takes it
+    /// over is a whole frame's work away and can't split the write from its effect. The three
+    /// pages share the low byte of their start address: one write flips.
+    pub fn flip(&mut self) {
+        self.bus.purpose(Purpose::Flip);
+        self.wait("display", |status| status & DISPLAY_DISABLED == 0);
+        let high = (page_start(self.back) >> 8) as u8;
+        write(&mut self.bus, CRTC, START_ADDRESS_HIGH, high);
+        self.front = self.back;
+        self.visible[self.front] = true;
+    }
+
+    /// Waits until the last flip holds: the page flipped to, and no other, is on the screen.
+    pub fn settle(&mut self) {
+        self.bus.purpose(Purpose::Flip);
+        self.wait("vertical retrace", |status| status & VERTICAL_RETRACE != 0);
+        self.visible = [false; PAGES];
+        self.visible[self.front] = true;
+    }
+
+    /// The page on the screen once the last flip holds, 0 to 2.
+    pub fn shown_page(&self) -> usize {
+        self.front
+    }
+
+    /// Forgets what the pages hold, so that the next frame on each paints all of it.
+    pub fn forget(&mut self) {
+        self.drawn = [Drawn::EVERYTHING; PAGES];
+    }
+
+    /// Every register of the mode as the card has it now.
+    pub fn registers(&mut self) -> Mode {
+        self.bus.purpose(Purpose::Setup);
+        read_mode(&mut self.bus)
+    }
+
+    /// The bus underneath.
+    pub fn bus(&mut self) -> &mut B {
+        &mut self.bus
+    }
+
+    fn wait(&mut self, what: &str, holds: impl Fn(u8) -> bool) {
+        for _ in 0..POLLS {
+            if holds(self.bus.in8(INPUT_STATUS_1)) {
+                return;
+            }
+        }
+        panic!("the card never reported {what} in {POLLS} reads of Input Status 1");
+    }
+}
+
+/// A page of the card, open for drawing.
+#[derive(Debug)]
+pub struct Canvas<'a, B> {
+    bus: &'a mut B,
+    drawn: &'a mut Drawn,
+    page_start: usize,
+}
+
+impl<B: Bus> Destination for Canvas<'_, B> {
+    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        let (column, top, _) = check_column(x, y, len);
+        self.drawn.add(x, y, len);
+        write(self.bus, SEQUENCER, MAP_MASK, 1 << (x & 3));
+        let at = self.page_start + top * STRIDE + column / 4;
+        self.bus.column(at as u16, len, draw);
+    }
+}
+
+/// A column's x, y and length, checked to lie in the picture.
+pub(crate) fn check_column(x: u16, y: u16, len: u16) -> (usize, usize, usize) {
+    let (x, y, len) = (usize::from(x), usize::from(y), usize::from(len));
+    assert!(
+        x < WIDTH && len >= 1 && y + len <= HEIGHT,
+        "a column of {len} at ({x}, {y}) is not in the picture"
+    );
+    (x, y, len)
+}
+
+fn page_start(page: usize) -> usize {
+    page * PAGE_BYTES
+}
+
+/// An indexed register in one word write: index in the low byte, data in the high byte.
+fn write<B: Bus>(bus: &mut B, port: u16, index: u8, value: u8) {
+    bus.out16(port, u16::from_le_bytes([index, value]));
+}
+
+/// Leaves the linear mode that the boot loader's VESA call left behind. While DISPI is enabled
+/// QEMU ignores the CRTC and scrambles planar writes. Adapters without it (Cirrus) read no
+/// B0Cx here and are left alone.
+fn disable_dispi<B: Bus>(bus: &mut B) {
+    bus.out16(DISPI_INDEX, DISPI_ID);
+    if bus.in16(DISPI_DATA) & 0xFFF0 == 0xB0C0 {
+        bus.out16(DISPI_INDEX, DISPI_ENABLE);
+        bus.out16(DISPI_DATA, 0);
+    }
+}
+
+/// Writes every register of the mode, the screen left off.
+fn write_mode<B: Bus>(bus: &mut B, mode: &Mode) {
+    // The clock in Misc may only change while the sequencer is held in reset.
+    write(bus, SEQUENCER, RESET, 0x01);
+    bus.out8(MISC_WRITE, mode.misc);
+    for (index, &value) in (0..).zip(&mode.sequencer).skip(1) {
+        // The screen stays off until the planes are cleared: no flash of old memory.
+        let off = if index == CLOCKING_MODE {
+            SCREEN_DISABLE
+        } else {
+            0
+        };
+        write(bus, SEQUENCER, index, value | off);
+    }
+    write(bus, SEQUENCER, RESET, mode.sequencer[usize::from(RESET)]);
+    // CR11 bit 7 would make the writes to CR0-7 vanish; the table's own value sets it again.
+    let unprotected = mode.crtc[usize::from(VERTICAL_RETRACE_END)] & !PROTECT;
+    write(bus, CRTC, VERTICAL_RETRACE_END, unprotected);
+    for (index, &value) in (0..).zip(&mode.crtc) {
+        write(bus, CRTC, index, value);
+    }
+    for (index, &value) in (0..).zip(&mode.graphics) {
+        write(bus, GRAPHICS, index, value);
+    }
+    bus.in8(INPUT_STATUS_1);
+    for (index, &value) in (0u8..).zip(&mode.attribute) {
+        bus.out8(ATTRIBUTE, index);
+        bus.out8(ATTRIBUTE, value);
+    }
+    bus.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE);
+    bus.out8(PEL_MASK, mode.pel_mask);
+}
+
+fn write_palette<B: Bus>(bus: &mut B, palette: &Palette) {
+    bus.out8(PEL_WRITE, 0);
+    for colour in palette {
+        for &part in colour {
+            bus.out8(PEL_DATA, part);
+        }
+    }
+}
+
+/// Reads every register of the mode. The picture blanks for the time that the attribute
+/// controller's palette is open.
+fn read_mode<B: Bus>(bus: &mut B) -> Mode {
+    let mut mode = Mode {
+        misc: bus.in8(MISC_READ),
+        sequencer: [0; 5],
+        crtc: [0; 25],
+        graphics: [0; 9],
+        attribute: [0; 21],
+        pel_mask: bus.in8(PEL_MASK),
+    };
+    read_indexed(bus, SEQUENCER, &mut mode.sequencer);
+    read_indexed(bus, CRTC, &mut mode.crtc);
+    read_indexed(bus, GRAPHICS, &mut mode.graphics);
+    for (index, value) in (0u8..).zip(&mut mode.attribute) {
+        bus.in8(INPUT_STATUS_1);
+        bus.out8(ATTRIBUTE, index);
+        *value = bus.in8(ATTRIBUTE_READ);
+    }
+    bus.in8(INPUT_STATUS_1);
+    bus.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE);
+    mode
+}
+
+fn read_indexed<B: Bus>(bus: &mut B, port: u16, values: &mut [u8]) {
+    for (index, value) in (0..).zip(values) {
+        bus.out8(port, index);
+        *value = bus.in8(port + 1);
+    }
+}
+
+/// PEL Mask is left out: QEMU has no register there.
+fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), Readback> {
+    let actual = read_mode(bus);
+    let mut sequencer = mode.sequencer;
+    sequencer[usize::from(CLOCKING_MODE)] |= SCREEN_DISABLE;
+    compare("Miscellaneous Output", &[mode.misc], &[actual.misc])?;
+    compare("sequencer", &sequencer, &actual.sequencer)?;
+    compare("CRTC", &mode.crtc, &actual.crtc)?;
+    compare("graphics controller", &mode.graphics, &actual.graphics)?;
+    compare("attribute controller", &mode.attribute, &actual.attribute)
+}
+
+fn compare(block: &'static str, expected: &[u8], actual: &[u8]) -> Result<(), Readback> {
+    for (index, (&expected, &actual)) in (0..).zip(expected.iter().zip(actual)) {
+        if expected != actual {
+            return Err(Readback {
+                block,
+                index,
+                expected,
+                actual,
+            });
+        }
+    }
+    Ok(())
+}

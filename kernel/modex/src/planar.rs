@@ -1,0 +1,57 @@
+//! A page in RAM, in the shape that the card has it.
+
+use core::ptr::NonNull;
+
+use crate::{Column, Destination, HEIGHT, PAGE_BYTES, STRIDE, WIDTH};
+
+/// Four planes of one page: pixel (x, y) is `planes[x & 3][80 y + x / 4]`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PlanarBuffer {
+    /// The planes.
+    pub planes: [[u8; PAGE_BYTES]; 4],
+}
+
+impl PlanarBuffer {
+    /// A page of zeros.
+    pub const fn new() -> Self {
+        Self {
+            planes: [[0; PAGE_BYTES]; 4],
+        }
+    }
+
+    /// Paints every line in the colour that `background` gives it.
+    pub fn clear(&mut self, background: &[u8; HEIGHT]) {
+        for plane in &mut self.planes {
+            for (line, &colour) in plane.chunks_exact_mut(STRIDE).zip(background) {
+                line.fill(colour);
+            }
+        }
+    }
+
+    /// The colour of pixel (x, y).
+    ///
+    /// # Panics
+    /// If the pixel is outside the page.
+    pub fn pixel(&self, x: usize, y: usize) -> u8 {
+        assert!(x < WIDTH, "x = {x} is outside the page");
+        self.planes[x & 3][y * STRIDE + x / 4]
+    }
+}
+
+impl Default for PlanarBuffer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Destination for PlanarBuffer {
+    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        let (x, top, len) = crate::driver::check_column(x, y, len);
+        let plane = &mut self.planes[x & 3];
+        let bytes = &mut plane[top * STRIDE + x / 4..][..(len - 1) * STRIDE + 1];
+        let base = NonNull::from(bytes).cast::<u8>();
+        // SAFETY: the slice spans the column from its first byte to its last, it was cut with
+        // bounds checks, and its exclusive borrow lives until `draw` returns.
+        draw(unsafe { Column::new(base, len as u16) });
+    }
+}
