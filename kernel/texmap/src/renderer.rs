@@ -1,0 +1,96 @@
+//! From polygons to pixels: jobs are collected and drawn in polygon order.
+
+use modex::Destination;
+
+use crate::{JobList, Texture, Vertex, affine, coverage};
+
+/// What was drawn, and what was not.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stats {
+    /// Polygons that were drawn (also those that cover no pixel).
+    pub polygons: u32,
+    /// Columns drawn.
+    pub columns: u32,
+    /// Pixels drawn.
+    pub pixels: u32,
+    /// Polygons outside the legal range, not drawn.
+    pub dropped: u32,
+    /// Times that the job list was full and had to be drawn before the picture was complete.
+    pub full: u32,
+}
+
+/// Draws polygons on a destination through a bounded list of jobs.
+#[derive(Debug)]
+pub struct Renderer<'a, D, const N: usize> {
+    jobs: &'a mut JobList<N>,
+    textures: &'a [Texture<'a>],
+    destination: &'a mut D,
+    stats: Stats,
+}
+
+impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
+    /// A renderer for one picture; whatever was in `jobs` is forgotten.
+    pub fn new(
+        jobs: &'a mut JobList<N>,
+        textures: &'a [Texture<'a>],
+        destination: &'a mut D,
+    ) -> Self {
+        jobs.clear();
+        Self {
+            jobs,
+            textures,
+            destination,
+            stats: Stats::default(),
+        }
+    }
+
+    /// Adds a polygon with the texture `textures[texture]`.
+    ///
+    /// # Panics
+    /// If there is no such texture.
+    pub fn polygon(&mut self, polygon: &[Vertex], texture: u16) {
+        let Self {
+            jobs,
+            textures,
+            destination,
+            stats,
+        } = self;
+        let scanned = coverage::columns(polygon, &textures[usize::from(texture)], texture, |job| {
+            if let Err(job) = jobs.push(job) {
+                stats.full += 1;
+                draw(jobs, textures, *destination, stats);
+                // A list that was just emptied takes the job: N is not zero.
+                let _ = jobs.push(job);
+            }
+        });
+        match scanned {
+            Ok(()) => stats.polygons += 1,
+            Err(_) => stats.dropped += 1,
+        }
+    }
+
+    /// Draws what is left and says what the picture took.
+    pub fn finish(mut self) -> Stats {
+        draw(self.jobs, self.textures, self.destination, &mut self.stats);
+        self.stats
+    }
+}
+
+/// Draws the jobs in their order and empties the list.
+fn draw<D: Destination, const N: usize>(
+    jobs: &mut JobList<N>,
+    textures: &[Texture<'_>],
+    destination: &mut D,
+    stats: &mut Stats,
+) {
+    const { assert!(N > 0, "a job list needs room for a job") };
+    for job in jobs.jobs() {
+        stats.columns += 1;
+        stats.pixels += u32::from(job.len);
+        let texture = &textures[usize::from(job.texture)];
+        destination.column(job.x, job.y, job.len, |column| {
+            affine::column(texture, job, column);
+        });
+    }
+    jobs.clear();
+}
