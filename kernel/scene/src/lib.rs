@@ -1,0 +1,27 @@
+//! What is seen: meshes, textures, palette, light, and the camera that looks at them.
+//!
+//! A picture is a function of scene and pose, and of nothing else: no clock and no history
+//! reaches it. [`Pose::at_tick`] makes the pose of a frame number; [`Stage::draw`] turns it into
+//! polygons in screen space and hands them to the mapper.
+//!
+//! All of it is integers and fixed point, so the same bits come out on the host and on the bare
+//! machine. A name that ends in a number of fraction bits has that many: `q16` is 16.16.
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod ball;
+mod camera;
+mod colour;
+mod mesh;
+mod noise;
+mod paint;
+mod pose;
+mod stage;
+pub mod trig;
+
+pub use ball::{TEXELS, ball, ball_texture, paint_ball};
+pub use camera::{FOCAL_LENGTH, NEAR, project};
+pub use colour::{LIGHT_LEVELS, LightTable};
+pub use mesh::{Corner, Face, Mesh, Vec3};
+pub use pose::{Orientation, Pose};
+pub use stage::{MAX_JOBS, MAX_VERTICES, SURFACE_BYTES, Scene, Stage, Storage};

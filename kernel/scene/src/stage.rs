@@ -1,0 +1,179 @@
+//! A scene made ready, and the way from a pose to polygons.
+
+use modex::{Destination, HEIGHT, Palette};
+use texmap::{JobList, MAX_SIDES, Renderer, Stats, Texture, Vertex};
+
+use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
+use crate::{Face, Mesh, Pose, project};
+
+/// Most vertices of a mesh.
+pub const MAX_VERTICES: usize = 1024;
+/// Column jobs that are collected before they are drawn.
+pub const MAX_JOBS: usize = 4096;
+/// Room for a scene's textures, each once per light level.
+pub const SURFACE_BYTES: usize = 1 << 20;
+/// Most textures of a scene.
+const MAX_TEXTURES: usize = 8;
+
+/// What is seen: a solid, what covers it, and the colours of everything.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a> {
+    /// Name, for people.
+    pub name: &'static str,
+    /// The solid, about the origin.
+    pub mesh: Mesh<'a>,
+    /// Textures in full light.
+    pub textures: &'a [Texture<'a>],
+    /// The DAC's colours.
+    pub palette: &'a Palette,
+    /// What a colour becomes at a light level.
+    pub light: &'a LightTable,
+    /// The colour of each scan line where there is no solid.
+    pub background: &'a [u8; HEIGHT],
+}
+
+/// The fixed arenas that drawing works in.
+#[derive(Debug)]
+pub struct Storage {
+    surfaces: [u8; SURFACE_BYTES],
+    points: [Option<(i32, i32)>; MAX_VERTICES],
+    jobs: JobList<MAX_JOBS>,
+}
+
+impl Storage {
+    /// Empty arenas. About 1.2 MiB: meant for a static.
+    pub const fn new() -> Self {
+        Self {
+            surfaces: [0; SURFACE_BYTES],
+            points: [None; MAX_VERTICES],
+            jobs: JobList::new(),
+        }
+    }
+}
+
+impl Default for Storage {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A scene with its textures lit.
+///
+/// Light would cost the mapper a second look-up for every pixel. A face has one light level, so
+/// each texture is run through the light table once per level when the scene is set, and a face
+/// takes the copy that fits: the mapper's loop knows nothing of light.
+#[derive(Debug)]
+pub struct Stage<'a> {
+    scene: Scene<'a>,
+    /// `surfaces[texture * LIGHT_LEVELS + level]`.
+    surfaces: [Texture<'a>; MAX_TEXTURES * LIGHT_LEVELS],
+    points: &'a mut [Option<(i32, i32)>; MAX_VERTICES],
+    jobs: &'a mut JobList<MAX_JOBS>,
+}
+
+impl<'a> Stage<'a> {
+    /// Lights the textures of `scene` into `storage`.
+    ///
+    /// # Panics
+    /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or textures
+    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together.
+    pub fn new(storage: &'a mut Storage, scene: Scene<'a>) -> Self {
+        assert!(
+            scene.mesh.vertices.len() <= MAX_VERTICES && scene.textures.len() <= MAX_TEXTURES,
+            "the scene has {} vertices and {} textures; the arenas hold {MAX_VERTICES} and {MAX_TEXTURES}",
+            scene.mesh.vertices.len(),
+            scene.textures.len(),
+        );
+        let Storage {
+            surfaces: arena,
+            points,
+            jobs,
+        } = storage;
+        let mut free = &mut arena[..];
+        let mut surfaces = [scene.textures[0]; MAX_TEXTURES * LIGHT_LEVELS];
+        for (texture, surfaces) in scene
+            .textures
+            .iter()
+            .zip(surfaces.chunks_exact_mut(LIGHT_LEVELS))
+        {
+            for (light, surface) in scene.light.iter().zip(surfaces) {
+                let (lit, rest) = free
+                    .split_at_mut_checked(texture.texels().len())
+                    .expect("the scene's textures are larger than the surface arena");
+                free = rest;
+                for (lit, &texel) in lit.iter_mut().zip(texture.texels()) {
+                    *lit = light[usize::from(texel)];
+                }
+                *surface = Texture::new(lit, texture.width(), texture.height())
+                    .expect("a lit copy has the sides of its texture");
+            }
+        }
+        Self {
+            scene,
+            surfaces,
+            points,
+            jobs,
+        }
+    }
+
+    /// The scene on the stage.
+    pub fn scene(&self) -> &Scene<'a> {
+        &self.scene
+    }
+
+    /// Draws the solid in `pose` on a destination that holds the background.
+    pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
+        let mesh = &self.scene.mesh;
+        let orientation = pose.orientation();
+        for (point, &vertex) in self.points.iter_mut().zip(mesh.vertices) {
+            let [x, y, z] = orientation.turn(vertex);
+            *point = project([x, y, z + pose.distance]);
+        }
+        let mut renderer = Renderer::new(self.jobs, &self.surfaces, destination);
+        for face in mesh.faces {
+            let mut polygon = [Vertex::default(); MAX_SIDES];
+            let polygon = &mut polygon[..usize::from(face.corners)];
+            if place(mesh, face, self.points, polygon) && looks_at_viewer(polygon) {
+                let level = lit_level(orientation.turn(face.normal));
+                let surface = usize::from(face.texture) * LIGHT_LEVELS + level;
+                renderer.polygon(polygon, surface as u16);
+            }
+        }
+        renderer.finish()
+    }
+}
+
+/// Fills `polygon` with the face's corners on the screen; false if one is too near the eye.
+fn place(
+    mesh: &Mesh<'_>,
+    face: &Face,
+    points: &[Option<(i32, i32)>],
+    polygon: &mut [Vertex],
+) -> bool {
+    let corners = &mesh.corners[usize::from(face.first)..][..polygon.len()];
+    for (vertex, corner) in polygon.iter_mut().zip(corners) {
+        let Some((x, y)) = points[usize::from(corner.vertex)] else {
+            return false;
+        };
+        *vertex = Vertex {
+            x,
+            y,
+            u: corner.u,
+            v: corner.v,
+        };
+    }
+    true
+}
+
+/// Whether the snapped polygon is wound clockwise on the screen (y down): its front.
+///
+/// The snapped area decides, not the normal: what is drawn is the snapped polygon, and a face
+/// seen edge-on may have turned over in the snapping.
+fn looks_at_viewer(polygon: &[Vertex]) -> bool {
+    let mut area = 0i64;
+    for (i, a) in polygon.iter().enumerate() {
+        let b = &polygon[(i + 1) % polygon.len()];
+        area += i64::from(a.x) * i64::from(b.y) - i64::from(b.x) * i64::from(a.y);
+    }
+    area > 0
+}
