@@ -1,0 +1,80 @@
+//! The serial line between kernel and host: both ends of one protocol.
+//!
+//! Text, a line at a time, so that a person at a terminal can speak it and `diff` can compare
+//! what was said. The kernel's lines end in a checksum:
+//!
+//! ```text
+//! ok show 1000 page 1 *8f3a90c4
+//! ```
+//!
+//! The eight hex digits are the CRC-32 (ISO-HDLC) of everything before ` *`. A line ends in LF;
+//! a CR before it is not part of the line, since a terminal turns LF into CR LF. Lines are
+//! printable ASCII, at most [`MAX_LINE`] bytes.
+//!
+//! The host sends a [`Command`] a line; it may end it in a checksum too, and then the kernel
+//! checks it. The kernel answers with any number of lines and closes with one that begins with
+//! `ok` or `error`. Between answers it says on its own:
+//!
+//! - `hello crystal-ball VERSION protocol 1`: the boot loader has handed over;
+//! - `running`: the first picture is on the screen;
+//! - `panic ...`, `exception ...`, and lines that explain it, then [`END_OF_REPORT`].
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod command;
+mod frame;
+mod lines;
+
+pub use command::{Command, CommandError, Fault};
+pub use frame::{FrameError, unframe, write_line};
+pub use lines::{Lines, Noise};
+
+/// The protocol's version, in the kernel's first line.
+pub const PROTOCOL: u32 = 1;
+/// Longest line in bytes, its checksum included, its end not.
+pub const MAX_LINE: usize = 512;
+/// First word of the kernel's first line.
+pub const HELLO: &str = "hello";
+/// The line that says that the first picture is on the screen.
+pub const RUNNING: &str = "running";
+/// First word of a panic's first line.
+pub const PANIC: &str = "panic";
+/// First word of an exception's first line.
+pub const EXCEPTION: &str = "exception";
+/// The last line of a panic's or exception's report. The kernel then waits, for a bounded time,
+/// for any byte: the host's word that it has taken its last screendump.
+pub const END_OF_REPORT: &str = "end of report";
+/// First word of an answer's last line when the command was carried out.
+pub const OK: &str = "ok";
+/// First word of an answer's last line when it was not.
+pub const ERROR: &str = "error";
+
+/// What the kernel writes to QEMU's `isa-debug-exit` device. QEMU's exit code is twice that
+/// plus one, so none of them is 0 or 1, which QEMU uses itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Exit {
+    /// Asked to leave.
+    Left = 0x10,
+    /// A panic.
+    Panic = 0x11,
+    /// A CPU exception.
+    Exception = 0x12,
+}
+
+impl Exit {
+    /// Port of the device, as the host configures it: on a PC no device answers there.
+    pub const PORT: u16 = 0xF4;
+
+    /// QEMU's exit code for it.
+    pub const fn code(self) -> i32 {
+        (self as i32) << 1 | 1
+    }
+
+    /// The exit that QEMU's exit code stands for.
+    pub fn from_code(code: i32) -> Option<Self> {
+        [Self::Left, Self::Panic, Self::Exception]
+            .into_iter()
+            .find(|exit| exit.code() == code)
+    }
+}
