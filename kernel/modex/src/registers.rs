@@ -80,6 +80,20 @@ pub struct Mode {
     pub pel_mask: u8,
 }
 
+impl Mode {
+    /// The blocks of the chip by name, each with its registers from index 0.
+    pub fn blocks(&self) -> [(&'static str, &[u8]); 6] {
+        [
+            ("misc", core::slice::from_ref(&self.misc)),
+            ("sequencer", &self.sequencer),
+            ("crtc", &self.crtc),
+            ("graphics", &self.graphics),
+            ("attribute", &self.attribute),
+            ("pel-mask", core::slice::from_ref(&self.pel_mask)),
+        ]
+    }
+}
+
 /// Mode X: 320x240, 256 colours, unchained, square pixels.
 pub const MODE_X: Mode = Mode {
     // 25 MHz dot clock, colour addresses, RAM on, and the sync polarity of 480 lines.

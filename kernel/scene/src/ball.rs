@@ -7,18 +7,18 @@ use crate::colour::{BACKGROUND, LIGHT_TABLE, PALETTE};
 use crate::trig::{cos, mul, sin};
 use crate::{Corner, Face, Mesh, Scene, Vec3, paint};
 
-/// Facets around.
+/// Facets around: 15 degrees each, so that gold meridians lie along edges and do not kink.
 const SEGMENTS: usize = 24;
-/// Rings of facets from pole to pole.
-const RINGS: usize = 12;
+/// Rings of facets from pole to pole: an odd number, so that the belt lies in the middle of one.
+const RINGS: usize = 15;
 const VERTICES: usize = (RINGS - 1) * SEGMENTS + 2;
 const FACES: usize = SEGMENTS * (2 + (RINGS - 2) * 2);
 const CORNERS: usize = 3 * FACES;
 
 /// Texels across the texture: once around the ball.
-pub const TEXTURE_WIDTH: u16 = 256;
+pub const TEXTURE_WIDTH: u16 = 240;
 /// Texels down the texture: from pole to pole.
-pub const TEXTURE_HEIGHT: u16 = 128;
+pub const TEXTURE_HEIGHT: u16 = 180;
 /// Texels in the texture.
 pub const TEXELS: usize = TEXTURE_WIDTH as usize * TEXTURE_HEIGHT as usize;
 
@@ -38,9 +38,9 @@ pub fn paint_ball(texels: &mut [u8; TEXELS]) {
         .enumerate()
     {
         for (i, texel) in row.iter_mut().enumerate() {
-            // The middle of the texel, in 1/2 texels, as angles.
-            let longitude = (2 * i + 1) as u32 * (1 << 23);
-            let polar = (2 * j + 1) as u32 * (1 << 23);
+            // The middle of the texel: a whole turn across, half a turn down.
+            let longitude = (((2 * i as u64 + 1) << 31) / u64::from(TEXTURE_WIDTH)) as u32;
+            let polar = (((2 * j as u64 + 1) << 30) / u64::from(TEXTURE_HEIGHT)) as u32;
             *texel = paint::texel(longitude, polar, on_sphere(longitude, polar));
         }
     }

@@ -1,20 +1,35 @@
 //! The palette, the light table and the background.
 //!
-//! 208 colours are 6 ramps of [`SHADES`] from dark to bright: what a texture may use. The light
-//! table moves a colour along its ramp. The rest belongs to the background.
+//! # Why ramps
+//! 256 colours have to serve every hue in every light. A search for the nearest entry to each lit
+//! colour would jump between hues from one facet to the next; so the palette is [`RAMPS`] ramps,
+//! each one material from night to glint, and light only ever moves a colour *along its ramp*. A
+//! texture names a ramp and a shade, and may use nothing else.
+//!
+//! # Why the hue shifts
+//! A shadow is not the colour times a half: what is turned from the lamp is lit by the night
+//! sky. All ramps therefore begin in the same night blue and end near the white of the lamp, and
+//! only between are they themselves. The dark side of seven materials falls together into one
+//! dusk, and a highlight looks like a reflection instead of a brighter paint.
+//!
+//! # Why a table
+//! A facet has one light level, so a whole texture is run through one row of [`LIGHT_TABLE`] when
+//! the scene is set, and drawing costs nothing more (see [`Stage`](crate::Stage)). The same row
+//! first dims (diffuse light) and then adds (the highlight), which no product could do.
+//!
+//! # The background
+//! It knows its scan line and nothing else: dusk over a sea. Between two neighbouring colours
+//! the lines alternate, so that no step of the 6-bit DAC is seen as an edge.
 
-use modex::{HEIGHT, Palette};
+use modex::{HEIGHT, Palette, Rgb6};
 
 use crate::Vec3;
 
 /// Light levels, from the dark side to the highlight.
-pub const LIGHT_LEVELS: usize = 32;
+pub const LIGHT_LEVELS: usize = 24;
 /// What each colour becomes at each light level.
 pub type LightTable = [[u8; 256]; LIGHT_LEVELS];
-/// Shades of a ramp.
-pub const SHADES: usize = 32;
-/// Ramps.
-pub const RAMPS: usize = 6;
+
 /// The DAC's colours.
 pub static PALETTE: Palette = palette();
 /// The light table of [`PALETTE`].
@@ -22,31 +37,140 @@ pub static LIGHT_TABLE: LightTable = light_table();
 /// The colour of each scan line behind the solid.
 pub static BACKGROUND: [u8; HEIGHT] = background();
 
+/// Black: entry 0, which the overscan shows.
+const BLACK: u8 = 0;
+/// For writing on the picture: bright, and untouched by light.
+pub const WHITE: u8 = 1;
+/// For what is to stand out in the writing.
+pub const YELLOW: u8 = 2;
+
+/// First colour of the ramps.
+const FIRST_SHADE: usize = 3;
+/// Shades of a ramp: six steps from one anchor to the next.
+pub const SHADES: usize = 25;
+/// Ramps of the palette.
+pub const RAMPS: usize = 7;
+
+/// A material: its ramp in the palette.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ramp {
+    /// Enamel, between [`Ramp::Rose`] and [`Ramp::Indigo`]: neighbours differ little, so that
+    /// clouds may pass from one to the next.
+    Violet,
+    /// Enamel, the colour of the night.
+    Indigo,
+    /// Enamel, between [`Ramp::Indigo`] and [`Ramp::Teal`].
+    Azure,
+    /// Enamel, the cold end.
+    Teal,
+    /// Enamel, the warm end.
+    Rose,
+    /// Metal: its shadows are red, not grey.
+    Gold,
+    /// Stars and silver.
+    Pearl,
+}
+
+impl Ramp {
+    /// The colour at a shade below [`SHADES`]; the upper quarter is best left to the highlight.
+    pub const fn shade(self, shade: usize) -> u8 {
+        (FIRST_SHADE + self as usize * SHADES + shade) as u8
+    }
+}
+
+/// Each ramp's night, shadow, body, light and glint. At the same shade all enamels are about
+/// equally bright, so that only hue changes where two of them meet.
+#[rustfmt::skip]
+const ANCHORS: [[Rgb6; 5]; RAMPS] = [
+    [[ 2,  1,  7], [13,  4, 25], [32, 11, 46], [50, 34, 61], [63, 58, 63]], // violet
+    [[ 1,  1,  7], [ 6,  7, 26], [15, 19, 48], [34, 41, 62], [59, 60, 63]], // indigo
+    [[ 1,  2,  7], [ 3, 10, 25], [ 8, 27, 49], [27, 48, 62], [58, 62, 63]], // azure
+    [[ 1,  2,  7], [ 2, 13, 22], [ 5, 34, 39], [26, 54, 53], [58, 63, 62]], // teal
+    [[ 3,  1,  7], [21,  4, 22], [48, 11, 36], [61, 35, 47], [63, 58, 60]], // rose
+    [[ 4,  2,  7], [21,  9, 10], [46, 28,  8], [62, 51, 20], [63, 63, 55]], // gold
+    [[ 4,  4, 10], [17, 17, 30], [38, 38, 49], [56, 54, 55], [63, 63, 63]], // pearl
+];
+
+/// First colour of the sky, the zenith; its last is the horizon.
+const FIRST_SKY: usize = FIRST_SHADE + RAMPS * SHADES;
+/// Colours of the sky: as many as its steepest stretch has steps of the DAC.
+const SKY: usize = 52;
+/// First colour of the sea, the deep; its last is the glitter below the horizon.
+const FIRST_SEA: usize = FIRST_SKY + SKY;
+/// Colours of the sea.
+const SEA: usize = 256 - FIRST_SEA;
+
+/// Dusk: half the sky is night, so that the lit side of the ball stands out; the glow is low and
+/// behind its dark side.
+const ZENITH_TO_HORIZON: [Rgb6; 9] = [
+    [1, 1, 6],
+    [2, 2, 10],
+    [3, 4, 14],
+    [5, 5, 18],
+    [9, 7, 23],
+    [15, 9, 27],
+    [25, 14, 31],
+    [40, 22, 32],
+    [60, 42, 34],
+];
+/// The sea shows the sky upside down, and dimmer.
+const DEEP_TO_GLITTER: [Rgb6; 5] = [
+    [2, 2, 9],
+    [6, 5, 17],
+    [14, 9, 25],
+    [29, 16, 28],
+    [52, 34, 32],
+];
+
 const fn palette() -> Palette {
     let mut palette = [[0; 3]; 256];
-    let full = [
-        [63, 50, 20],
-        [63, 60, 50],
-        [20, 24, 60],
-        [48, 20, 60],
-        [16, 50, 52],
-        [60, 16, 20],
-    ];
+    palette[BLACK as usize] = [0, 0, 0];
+    palette[WHITE as usize] = [63, 63, 63];
+    palette[YELLOW as usize] = [63, 58, 24];
+    let mut ramp = 0;
+    while ramp < RAMPS {
+        blend(
+            &mut palette,
+            FIRST_SHADE + ramp * SHADES,
+            SHADES,
+            &ANCHORS[ramp],
+        );
+        ramp += 1;
+    }
+    blend(&mut palette, FIRST_SKY, SKY, &ZENITH_TO_HORIZON);
+    blend(&mut palette, FIRST_SEA, SEA, &DEEP_TO_GLITTER);
+    palette
+}
+
+/// Fills `count` entries from `first` on with colours evenly along `anchors`.
+const fn blend(palette: &mut Palette, first: usize, count: usize, anchors: &[Rgb6]) {
+    let (steps, spans) = (count - 1, anchors.len() - 1);
     let mut i = 0;
-    while i < RAMPS * SHADES {
+    while i < count {
+        // The last colour ends the last span, it does not begin another.
+        let span = if i == steps {
+            spans - 1
+        } else {
+            i * spans / steps
+        };
+        let within = i * spans - span * steps;
         let mut k = 0;
         while k < 3 {
-            palette[i][k] = (full[i / SHADES][k] * (i % SHADES) / (SHADES - 1)) as u8;
+            let (a, b) = (anchors[span][k] as usize, anchors[span + 1][k] as usize);
+            palette[first + i][k] = ((a * (steps - within) + b * within + steps / 2) / steps) as u8;
             k += 1;
         }
         i += 1;
     }
-    while i < 256 {
-        palette[i] = [0, 0, ((i - RAMPS * SHADES) / 3) as u8];
-        i += 1;
-    }
-    palette
 }
+
+/// The level at which a texture has the colours it was painted in. Below it is dimmed; above it
+/// the highlight is added.
+const FULL_LIGHT: usize = 17;
+/// Light from everywhere, in levels: what keeps the dark side from black.
+const AMBIENT: usize = 4;
+/// Half shades that a level of highlight adds: enamel half way to white, metal nearly to it.
+const SHINE: [usize; RAMPS] = [3, 3, 3, 3, 3, 4, 3];
 
 const fn light_table() -> LightTable {
     let mut table = [[0; 256]; LIGHT_LEVELS];
@@ -54,36 +178,155 @@ const fn light_table() -> LightTable {
     while level < LIGHT_LEVELS {
         let mut colour = 0;
         while colour < 256 {
-            table[level][colour] = if colour < RAMPS * SHADES {
-                let (ramp, shade) = (colour / SHADES, colour % SHADES);
-                (ramp * SHADES + shade * (level + 1) / LIGHT_LEVELS) as u8
-            } else {
-                colour as u8
-            };
+            // Neither the background nor writing is lit.
+            table[level][colour] = colour as u8;
             colour += 1;
+        }
+        let mut i = 0;
+        while i < RAMPS * SHADES {
+            let (ramp, shade) = (i / SHADES, i % SHADES);
+            let light = if level < FULL_LIGHT {
+                level
+            } else {
+                FULL_LIGHT
+            };
+            let full = FULL_LIGHT + AMBIENT;
+            let diffuse = (shade * (light + AMBIENT) + full / 2) / full;
+            let lit = diffuse + (level - light) * SHINE[ramp] / 2;
+            let lit = if lit < SHADES { lit } else { SHADES - 1 };
+            table[level][FIRST_SHADE + i] = (FIRST_SHADE + ramp * SHADES + lit) as u8;
+            i += 1;
         }
         level += 1;
     }
     table
 }
 
+/// First line of the sea: below the ball's middle, so that the glow is behind its dark side.
+const HORIZON: usize = 178;
+
 const fn background() -> [u8; HEIGHT] {
     let mut lines = [0; HEIGHT];
+    // Eighths that are added to a line's place between two colours before it is cut to one. Any
+    // eight lines in a row have all of them, and neighbours are far apart.
+    let thresholds = [0, 4, 2, 6, 1, 5, 3, 7];
     let mut y = 0;
+    while y < HORIZON {
+        let eighths = y * (SKY - 1) * 8 / (HORIZON - 1);
+        lines[y] = (FIRST_SKY + (eighths + thresholds[y % 8]) / 8) as u8;
+        y += 1;
+    }
+    // The horizon has the last colour; no threshold, at most 7/8, takes it to the next.
+    assert!(lines[HORIZON - 1] as usize == FIRST_SKY + SKY - 1);
+    let sea = HEIGHT - HORIZON;
     while y < HEIGHT {
-        lines[y] = (RAMPS * SHADES + y * (256 - RAMPS * SHADES) / HEIGHT) as u8;
+        let (depth, fade) = (y - HORIZON, HEIGHT - y);
+        // Waves at even distances: the nearer they are to the horizon, the closer together.
+        let phase = 9000 / (depth + 8) % 64;
+        let crest = if phase < 32 { phase } else { 63 - phase };
+        let glitter = (SEA - 1) * fade * fade * (20 + crest) / (sea * sea * 51);
+        lines[y] = (FIRST_SEA + glitter) as u8;
         y += 1;
     }
     lines
 }
 
+/// Towards the lamp: from the upper left, before the screen; a unit vector, 14 fraction bits.
+const LAMP: [i64; 3] = [-7000, -6200, -13_400];
+/// Halfway between the lamp and the viewer: where a mirror would show the lamp.
+const HALFWAY: [i64; 3] = [-3674, -3254, -15_632];
+/// Towards the dusk behind the ball, opposite the lamp: draws the rim of the dark side.
+const DUSK: [i64; 3] = [9800, 9800, 8700];
+
 /// The light level of a face whose outward normal in the viewer's space is `normal`, 14
 /// fraction bits.
 pub fn lit_level(normal: Vec3) -> usize {
-    let towards_light = [-7600, -9000, -11000];
-    let dot: i64 = (0..3)
-        .map(|k| i64::from(normal[k]) * towards_light[k])
-        .sum();
-    let level = 4 + dot * 27 / (1 << 28);
+    let normal = normal.map(i64::from);
+    // Of two unit vectors: at most 2^14, but for rounding.
+    let cosine = |v: [i64; 3]| (0..3).map(|k| normal[k] * v[k]).sum::<i64>() >> 14;
+    // The lamp is large: its light reaches a quarter of the radius beyond the terminator.
+    let lamp = (cosine(LAMP) + 4096).max(0) * 4 / 5;
+    // Squared, it stays at the rim and leaves a shadow before it.
+    let dusk = cosine(DUSK).max(0).pow(2) >> 14;
+    // The 32nd power: a highlight three facets wide.
+    let highlight = (0..5).fold(cosine(HALFWAY).max(0), |power, _| (power * power) >> 14);
+    let level = (lamp * 16 + dusk * 24 + highlight * 8 + (1 << 13)) >> 14;
     level.clamp(0, LIGHT_LEVELS as i64 - 1) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Ten times the usual weights of red, green and blue in brightness.
+    fn brightness(colour: usize) -> u32 {
+        let [r, g, b] = PALETTE[colour].map(u32::from);
+        3 * r + 6 * g + b
+    }
+
+    fn ramp_of(colour: usize) -> Option<usize> {
+        (FIRST_SHADE..FIRST_SKY)
+            .contains(&colour)
+            .then(|| (colour - FIRST_SHADE) / SHADES)
+    }
+
+    #[test]
+    fn the_palette_is_of_6_bits_and_begins_with_black() {
+        assert!(PALETTE.iter().flatten().all(|&channel| channel < 64));
+        assert_eq!(PALETTE[usize::from(BLACK)], [0; 3]);
+        assert_eq!(Ramp::Pearl.shade(SHADES), FIRST_SKY as u8);
+    }
+
+    #[test]
+    fn ramps_brighten_from_shade_to_shade() {
+        for colour in FIRST_SHADE + 1..FIRST_SKY {
+            if ramp_of(colour) == ramp_of(colour - 1) {
+                assert!(brightness(colour) > brightness(colour - 1), "{colour}");
+            }
+        }
+    }
+
+    #[test]
+    fn light_moves_a_colour_along_its_ramp() {
+        for colour in 0..=255u8 {
+            let colour = usize::from(colour);
+            let lit = |level: usize| usize::from(LIGHT_TABLE[level][colour]);
+            assert_eq!(lit(FULL_LIGHT), colour);
+            for level in 1..LIGHT_LEVELS {
+                assert_eq!(ramp_of(lit(level)), ramp_of(colour), "{colour} at {level}");
+                assert!(lit(level) >= lit(level - 1), "{colour} at {level}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_ball_has_a_highlight_a_dark_side_and_a_rim() {
+        let level = |normal: [i64; 3]| lit_level(normal.map(|c| c as i32));
+        assert_eq!(level(HALFWAY), LIGHT_LEVELS - 1);
+        // From the middle of the ball down to the right: 0, 45 and 70 degrees.
+        let middle = level([0, 0, -16_384]);
+        let shadow = level([8192, 8192, -11_585]);
+        let rim = level([10_886, 10_886, -5604]);
+        assert!(shadow < rim && rim < middle, "{middle}, {shadow}, {rim}");
+    }
+
+    #[test]
+    fn the_sky_has_no_edge_and_the_sea_is_the_seas() {
+        for y in 0..HEIGHT {
+            let colour = usize::from(BACKGROUND[y]);
+            let own = if y < HORIZON {
+                FIRST_SKY..FIRST_SEA
+            } else {
+                FIRST_SEA..256
+            };
+            assert!(own.contains(&colour), "line {y}");
+            if y > 0 && y < HORIZON {
+                let before = PALETTE[usize::from(BACKGROUND[y - 1])];
+                for (a, b) in PALETTE[colour].into_iter().zip(before) {
+                    // 4 of 63, where the glow is steepest.
+                    assert!(a.abs_diff(b) <= 4, "line {y}");
+                }
+            }
+        }
+    }
 }

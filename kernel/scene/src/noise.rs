@@ -1,45 +1,65 @@
 //! Smooth noise in integers, for textures drawn by code.
 
+/// One, with the 16 fraction bits of everything here.
+pub const ONE: i64 = 1 << 16;
+
 /// Value noise at a point with 16 fraction bits a cell: 0 to 65 535, smooth over the cells.
 pub fn noise(point: [i64; 3], seed: u32) -> i64 {
-    let cell = point.map(|c| c >> 16);
-    // 3t^2 - 2t^3, so that slopes meet at the cells' corners.
-    let smooth = point.map(|c| {
-        let t = c & 0xFFFF;
-        (((t * t) >> 16) * (3 * 65_536 - 2 * t)) >> 16
+    let [x, y, z] = point.map(|c| c >> 16);
+    // 3t^2 - 2t^3, so that slopes meet at the cells' corners; 0 to 65 535.
+    let [sx, sy, sz] = point.map(|c| {
+        let t = c & (ONE - 1);
+        (((t * t) >> 16) * (3 * ONE - 2 * t)) >> 16
     });
-    let mut sum = 0;
-    for corner in 0..8i64 {
-        let offset = [corner & 1, (corner >> 1) & 1, (corner >> 2) & 1];
-        let mut weight = 65_536;
-        for k in 0..3 {
-            weight = weight
-                * if offset[k] == 1 {
-                    smooth[k]
-                } else {
-                    65_536 - smooth[k]
-                }
-                >> 16;
-        }
-        sum += weight * hash([0, 1, 2].map(|k| cell[k] + offset[k]), seed) >> 16;
-    }
-    sum.min(65_535)
+    let along_x = |y, z| mix(hash([x, y, z], seed), hash([x + 1, y, z], seed), sx);
+    let along_y = |z| mix(along_x(y, z), along_x(y + 1, z), sy);
+    mix(along_y(z), along_y(z + 1), sz)
 }
 
-/// Four octaves of [`noise`], each half as strong and twice as fine: 0 to 65 535.
-pub fn fractal(point: [i64; 3], seed: u32) -> i64 {
-    (0..4)
+/// `octaves` octaves of [`noise`], each half as strong and twice as fine, stretched about the
+/// middle, where such sums crowd: 0 to 65 535.
+pub fn fractal(point: [i64; 3], octaves: u32, seed: u32) -> i64 {
+    let sum: i64 = (0..octaves)
         .map(|octave| noise(point.map(|c| c << octave), seed + octave) >> (octave + 1))
-        .sum::<i64>()
-        * 16
-        / 15
+        .sum();
+    ((sum - ONE / 2) * 2 + ONE / 2).clamp(0, ONE - 1)
 }
 
-fn hash(cell: [i64; 3], seed: u32) -> i64 {
+/// From `a` (at `t` = 0) towards `b` (at 65 536).
+const fn mix(a: i64, b: i64, t: i64) -> i64 {
+    a + (((b - a) * t) >> 16)
+}
+
+/// A number without pattern for a cell: 0 to 65 535.
+pub fn hash(cell: [i64; 3], seed: u32) -> i64 {
     let mut h = seed.wrapping_mul(0x9E37_79B9);
     for c in cell {
         h = (h ^ c as u32).wrapping_mul(0x85EB_CA6B);
         h ^= h >> 15;
     }
     i64::from(h.wrapping_mul(0xC2B2_AE35) >> 16)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn noise_is_smooth_and_keeps_its_range() {
+        let mut before = noise([-3 * ONE, 700, 41_000], 5);
+        for x in -3 * ONE..3 * ONE {
+            let now = noise([x, 700, 41_000], 5);
+            assert!((0..ONE).contains(&now) && now.abs_diff(before) < 8, "{x}");
+            before = now;
+        }
+        let corner = [7, -2, 1];
+        assert_eq!(noise(corner.map(|c| c * ONE), 9), hash(corner, 9));
+    }
+
+    #[test]
+    fn fractal_reaches_both_ends_and_no_farther() {
+        let all = (0..4000).map(|i| fractal([i * 9001, i * 77, i * 5], 4, 1));
+        let (least, most) = all.fold((ONE, 0), |(a, b), n| (a.min(n), b.max(n)));
+        assert!((0..ONE / 16).contains(&least) && (ONE * 15 / 16..ONE).contains(&most));
+    }
 }

@@ -32,9 +32,11 @@ impl Pose {
             yaw: tick
                 .wrapping_mul(((1u64 << 32) / Self::TURN as u64) as u32)
                 .wrapping_neg(),
-            pitch: (18 * DEGREE).wrapping_neg(),
-            roll: 20 * DEGREE,
-            distance: 3 << 16,
+            // The rose on the upper pole is seen, and the belt still is.
+            pitch: 28 * DEGREE,
+            roll: 18 * DEGREE,
+            // A silhouette of 93 pixels of the 120 from the middle to the edge.
+            distance: 295 * (1 << 16) / 100,
         }
     }
 
