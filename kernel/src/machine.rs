@@ -1,0 +1,85 @@
+//! The machine's edge: everything that is reached through ports, physical memory or interrupts.
+
+mod cpu;
+mod ports;
+pub mod report;
+pub mod serial;
+pub mod timer;
+mod vga;
+
+use core::ptr::NonNull;
+
+use bootloader_api::BootInfo;
+use link::{Exit, HELLO, PROTOCOL};
+
+pub use vga::Window;
+
+/// Where the card's window lies in physical memory.
+const WINDOW: u64 = 0xA_0000;
+
+/// The machine, ready: exceptions are reported, ticks count, the serial line works.
+#[derive(Debug)]
+pub struct Machine {
+    /// The VGA.
+    pub vga: Window,
+}
+
+/// Makes the machine ready. Called once, at the start.
+pub fn init(boot_info: &'static mut BootInfo) -> Machine {
+    serial::init();
+    // An LF first: it ends whatever firmware may have left on the line.
+    serial::end_line();
+    crate::line!(
+        "{HELLO} crystal-ball {} protocol {PROTOCOL}",
+        env!("CARGO_PKG_VERSION")
+    );
+    cpu::init(boot_info.kernel_stack_bottom);
+    timer::start();
+    let offset = boot_info
+        .physical_memory_offset
+        .into_option()
+        .expect("the boot loader was asked to map the physical memory");
+    let base = NonNull::new((offset + WINDOW) as *mut u8).expect("the window is not at zero");
+    // SAFETY: the boot loader maps all physical memory at `offset`, the card's window with it,
+    // for as long as the kernel runs; no other pointer is made to it.
+    let vga = unsafe { Window::new(base) };
+    Machine { vga }
+}
+
+/// Sleeps until an interrupt: a tick, or a byte on the serial line. `idle` is asked with
+/// interrupts off, so nothing that arrives in between is slept through.
+pub fn sleep_while(idle: impl FnOnce() -> bool) {
+    x86_64::instructions::interrupts::disable();
+    if idle() {
+        x86_64::instructions::interrupts::enable_and_hlt();
+    } else {
+        x86_64::instructions::interrupts::enable();
+    }
+}
+
+/// Ends QEMU with `exit`'s code; on a machine without its exit device, stops for good.
+pub fn exit(exit: Exit) -> ! {
+    // SAFETY: on a PC nothing but QEMU's exit device answers at this port.
+    unsafe { ports::out32(Exit::PORT, exit as u32) };
+    // QEMU ends some instructions later.
+    stop()
+}
+
+/// Stops this processor for good.
+pub fn stop() -> ! {
+    x86_64::instructions::interrupts::disable();
+    loop {
+        x86_64::instructions::hlt();
+    }
+}
+
+/// Breaks in the way that was asked for.
+pub fn fail(fault: link::Fault) -> ! {
+    match fault {
+        link::Fault::Panic => panic!("asked to, by 'fail panic'"),
+        link::Fault::PageFault => cpu::page_fault(),
+        link::Fault::StackOverflow => cpu::stack_overflow(),
+        link::Fault::TripleFault => cpu::triple_fault(),
+        link::Fault::Hang => stop(),
+    }
+}

@@ -1,0 +1,71 @@
+//! The bare machine's VGA: the driver's bus.
+
+use core::ptr::NonNull;
+
+use modex::{Bus, Column, PLANE_BYTES, STRIDE};
+
+use super::ports;
+
+/// The card's ports, and its window at A0000h. The one place that reaches video memory; always
+/// by volatile accesses, and never as a slice: a compiler that saw plain stores would merge or
+/// drop those that only a port write tells apart.
+#[derive(Debug)]
+pub struct Window {
+    base: NonNull<u8>,
+}
+
+impl Window {
+    /// The window mapped at `base`.
+    ///
+    /// # Safety
+    /// `base..base + 64 KiB` is the card's window for the life of the value, and nothing else
+    /// reaches the window or the card's ports.
+    pub unsafe fn new(base: NonNull<u8>) -> Self {
+        Self { base }
+    }
+}
+
+impl Bus for Window {
+    fn out8(&mut self, port: u16, value: u8) {
+        // SAFETY: the VGA's ports change what is shown and where stores go, never RAM.
+        unsafe { ports::out8(port, value) }
+    }
+
+    fn out16(&mut self, port: u16, value: u16) {
+        // SAFETY: as in `out8`.
+        unsafe { ports::out16(port, value) }
+    }
+
+    fn in8(&mut self, port: u16) -> u8 {
+        // SAFETY: as in `out8`.
+        unsafe { ports::in8(port) }
+    }
+
+    fn in16(&mut self, port: u16) -> u16 {
+        // SAFETY: as in `out8`.
+        unsafe { ports::in16(port) }
+    }
+
+    fn store64(&mut self, at: u16, bytes: u64) {
+        assert!(
+            at.is_multiple_of(8),
+            "a wide store at {at:04x} is not aligned"
+        );
+        // SAFETY: a multiple of 8 below 64 KiB leaves 8 bytes to the end of the window.
+        let place = unsafe { self.base.add(usize::from(at)) }.cast::<u64>();
+        // SAFETY: inside the window, and aligned: the window starts on a page.
+        unsafe { place.write_volatile(bytes) }
+    }
+
+    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        let end = usize::from(at) + usize::from(len.saturating_sub(1)) * STRIDE;
+        assert!(
+            end < PLANE_BYTES,
+            "a column of {len} at {at:04x} leaves the window"
+        );
+        // SAFETY: `at` is inside the window.
+        let base = unsafe { self.base.add(usize::from(at)) };
+        // SAFETY: from `at` to `end` the column is inside the window, which `self` alone reaches.
+        draw(unsafe { Column::new(base, len) });
+    }
+}

@@ -1,0 +1,47 @@
+//! The kernel: Crystal Ball on the bare machine.
+//!
+//! Two parts. [`machine`] is the edge: ports, video memory, interrupts, the serial line, and all
+//! of the kernel's `unsafe`. [`show`] is the program: it draws pictures and answers commands.
+//! Whatever goes wrong is reported on the serial line in words and ends QEMU with a code of its
+//! own; the kernel never restarts by itself.
+//!
+//! All of it compiles for the host as well, where it says what to do instead; only the entry
+//! point and the panic handler are the bare machine's. So clippy and editors see every line.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+mod machine;
+mod show;
+
+use bootloader_api::{BootInfo, BootloaderConfig, config::Mapping};
+
+/// What the kernel asks of the boot loader.
+static BOOT: BootloaderConfig = {
+    let mut config = BootloaderConfig::new_default();
+    // The boot loader maps no video memory by itself: it lies in the physical memory at A0000h.
+    config.mappings.physical_memory = Some(Mapping::Dynamic);
+    config
+};
+
+fn start(boot_info: &'static mut BootInfo) -> ! {
+    let machine = machine::init(boot_info);
+    show::run(machine)
+}
+
+#[cfg(target_os = "none")]
+bootloader_api::entry_point!(start, config = &BOOT);
+
+#[cfg(target_os = "none")]
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    machine::report::panic(info)
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    // The kernel's code is reached from here too, so that the host's compiler checks all of it.
+    let kernel: (fn(&'static mut BootInfo) -> !, _) = (start, &BOOT);
+    let report = machine::report::panic;
+    core::hint::black_box((kernel, report));
+    eprintln!("this is the bare machine's program: `cargo run` in the workspace boots it in QEMU");
+    std::process::exit(2);
+}
