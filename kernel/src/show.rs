@@ -5,7 +5,7 @@
 //! video memory between commands, so that what is on the screen can be taken as evidence.
 
 use link::{Command, ERROR, Lines, OK, RUNNING};
-use modex::{Counted, ModeX};
+use modex::{Counted, ModeX, Readback};
 use scene::{Pose, Stage, Storage, TEXELS};
 use spin::Mutex;
 use texmap::Stats;
@@ -30,12 +30,9 @@ pub fn run(machine: Machine) -> ! {
     scene::paint_ball(&mut memory.texels);
     let textures = [scene::ball_texture(&memory.texels).expect("the ball's texture has its size")];
     let scene = scene::ball(&textures);
-    let card = match ModeX::set(Counted::new(machine.vga), scene.palette) {
-        Ok(card) => card,
-        Err(readback) => panic!("Mode X is not set: {readback}"),
-    };
+    let card = ModeX::set(Counted::new(machine.vga), scene.palette);
     let mut show = Show {
-        card,
+        card: set(card),
         stage: Stage::new(&mut memory.storage, scene),
         drawn: Stats::default(),
         pace: Some(Pace::default()),
@@ -55,6 +52,14 @@ pub fn run(machine: Machine) -> ! {
         } else {
             machine::sleep_while(|| timer::ticks() == tick && !serial::has_received());
         }
+    }
+}
+
+/// A card that does not read back as it was set can't be drawn on.
+fn set<T>(outcome: Result<T, Readback>) -> T {
+    match outcome {
+        Ok(card) => card,
+        Err(readback) => panic!("Mode X is not set: {readback}"),
     }
 }
 
@@ -104,16 +109,25 @@ impl Show<'_> {
         self.drawn = self.stage.draw(&Pose::at_tick(frame), &mut canvas);
     }
 
+    /// Stops the show, the card as after the mode set: what follows depends on the commands
+    /// alone, and not on how far the show had come.
+    fn hold(&mut self) {
+        self.pace = None;
+        set(self.card.reset(self.stage.scene().palette));
+    }
+
     fn obey(&mut self, line: &str) {
         let command = match Command::parse(line) {
             Ok(command) => command,
             Err(error) => return line!("{ERROR} {error}"),
         };
         match command {
-            Command::Hold => self.pace = None,
+            Command::Hold => self.hold(),
             Command::Run => self.pace = Some(Pace::default()),
             Command::Show(frame) => {
-                self.pace = None;
+                if self.pace.is_some() {
+                    self.hold();
+                }
                 self.draw(frame);
                 self.card.flip();
                 self.card.settle();

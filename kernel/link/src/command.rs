@@ -7,11 +7,13 @@ use crate::{FrameError, unframe};
 /// A command, as it stands on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// `hold`: stop the show; draw only what is asked for.
+    /// `hold`: stop the show, clear the pages, and draw only what is asked for. From here on the
+    /// picture memory depends on the commands alone.
     Hold,
-    /// `run`: go on with the show.
+    /// `run`: let the show run.
     Run,
-    /// `show N`: draw picture N on the next page, flip, and answer when the flip holds. Holds.
+    /// `show N`: draw picture N on the next page, flip, and answer when the flip holds. A show
+    /// that runs is held first.
     Show(u32),
     /// `registers`: every register of the mode, read back.
     Registers,

@@ -92,17 +92,11 @@ pub struct ModeX<B> {
 }
 
 impl<B: Bus> ModeX<B> {
-    /// Sets the mode, reads it back, loads the palette and clears all four planes; page 0 is
-    /// shown.
+    /// The card behind `bus`, set as [`ModeX::reset`] sets it.
     ///
     /// # Errors
-    /// The first register that reads back wrong.
-    pub fn set(mut bus: B, palette: &Palette) -> Result<Self, Readback> {
-        bus.purpose(Purpose::Setup);
-        disable_dispi(&mut bus);
-        write_mode(&mut bus, &MODE_X);
-        check_mode(&mut bus, &MODE_X)?;
-        write_palette(&mut bus, palette);
+    /// As [`ModeX::reset`].
+    pub fn set(bus: B, palette: &Palette) -> Result<Self, Readback> {
         let mut card = Self {
             bus,
             drawn: [Drawn::EVERYTHING; PAGES],
@@ -110,12 +104,31 @@ impl<B: Bus> ModeX<B> {
             back: 0,
             visible: [true, false, false],
         };
+        card.reset(palette)?;
+        Ok(card)
+    }
+
+    /// Sets the mode, reads it back, loads the palette and clears all four planes; page 0 is
+    /// shown. What follows depends on nothing that was before.
+    ///
+    /// # Errors
+    /// The first register that reads back wrong.
+    pub fn reset(&mut self, palette: &Palette) -> Result<(), Readback> {
+        let bus = &mut self.bus;
+        bus.purpose(Purpose::Setup);
+        disable_dispi(bus);
+        write_mode(bus, &MODE_X);
+        check_mode(bus, &MODE_X)?;
+        write_palette(bus, palette);
         for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
-            card.bus.store64(at as u16, 0);
+            bus.store64(at as u16, 0);
         }
         let clocking = MODE_X.sequencer[usize::from(CLOCKING_MODE)];
-        write(&mut card.bus, SEQUENCER, CLOCKING_MODE, clocking);
-        Ok(card)
+        write(bus, SEQUENCER, CLOCKING_MODE, clocking);
+        self.drawn = [Drawn::EVERYTHING; PAGES];
+        (self.front, self.back) = (0, 0);
+        self.visible = [true, false, false];
+        Ok(())
     }
 
     /// The page after the one drawn last, on its bare background: `background[y]` is the
@@ -170,11 +183,6 @@ impl<B: Bus> ModeX<B> {
     /// The page on the screen once the last flip holds, 0 to 2.
     pub fn shown_page(&self) -> usize {
         self.front
-    }
-
-    /// Forgets what the pages hold, so that the next frame on each paints all of it.
-    pub fn forget(&mut self) {
-        self.drawn = [Drawn::EVERYTHING; PAGES];
     }
 
     /// Every register of the mode as the card has it now.

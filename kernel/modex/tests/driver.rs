@@ -1,0 +1,299 @@
+//! The driver on a recorder: what it writes, in which order, and what that leaves in the planes.
+
+use std::collections::HashMap;
+use std::ptr::NonNull;
+
+use modex::registers::*;
+use modex::{
+    Bus, Column, Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PAGES, PLANE_BYTES, PlanarBuffer,
+    STRIDE, WIDTH,
+};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Access {
+    Out8(u16, u8),
+    Out16(u16, u16),
+    In(u16),
+    Store(u16),
+}
+
+/// Remembers every access, and models just enough to read registers back and to look into the
+/// planes. Not a VGA: it checks nothing.
+#[derive(Debug)]
+struct Recorder {
+    log: Vec<Access>,
+    index: HashMap<u16, u8>,
+    registers: HashMap<(u16, u8), u8>,
+    attribute_data: bool,
+    planes: Vec<Vec<u8>>,
+    /// What Input Status 1 reads, by turns.
+    status: Vec<u8>,
+    /// A register that does not hold what is written.
+    stuck: Option<(u16, u8)>,
+    dispi: bool,
+}
+
+impl Recorder {
+    fn new() -> Self {
+        Self {
+            log: Vec::new(),
+            index: HashMap::new(),
+            registers: HashMap::new(),
+            attribute_data: false,
+            planes: vec![vec![0xEE; PLANE_BYTES]; 4],
+            status: vec![VERTICAL_RETRACE | DISPLAY_DISABLED, 0],
+            stuck: None,
+            dispi: true,
+        }
+    }
+
+    fn store(&mut self, at: usize, value: u8) {
+        let mask = self.registers.get(&(SEQUENCER, MAP_MASK)).copied();
+        for (plane, bytes) in self.planes.iter_mut().enumerate() {
+            if mask.unwrap_or(0) >> plane & 1 == 1 {
+                bytes[at] = value;
+            }
+        }
+    }
+
+    fn write(&mut self, port: u16, index: u8, value: u8) {
+        if self.stuck != Some((port, index)) {
+            self.registers.insert((port, index), value);
+        }
+    }
+}
+
+impl Bus for &mut Recorder {
+    fn out8(&mut self, port: u16, value: u8) {
+        self.log.push(Access::Out8(port, value));
+        match port {
+            ATTRIBUTE if self.attribute_data => {
+                let index = self.index[&ATTRIBUTE];
+                self.write(ATTRIBUTE, index, value);
+                self.attribute_data = false;
+            }
+            ATTRIBUTE => {
+                self.index.insert(ATTRIBUTE, value);
+                self.attribute_data = true;
+            }
+            SEQUENCER | GRAPHICS | CRTC => {
+                self.index.insert(port, value);
+            }
+            _ => self.write(port, 0, value),
+        }
+    }
+
+    fn out16(&mut self, port: u16, value: u16) {
+        self.log.push(Access::Out16(port, value));
+        let [index, data] = value.to_le_bytes();
+        self.write(port, index, data);
+    }
+
+    fn in8(&mut self, port: u16) -> u8 {
+        self.log.push(Access::In(port));
+        let block = match port {
+            INPUT_STATUS_1 => {
+                self.attribute_data = false;
+                self.status.rotate_left(1);
+                return self.status[0];
+            }
+            MISC_READ => return self.registers[&(MISC_WRITE, 0)],
+            PEL_MASK => return self.registers[&(PEL_MASK, 0)],
+            ATTRIBUTE_READ => ATTRIBUTE,
+            port => port - 1,
+        };
+        let read = (block, self.index[&block]);
+        self.registers.get(&read).copied().unwrap_or(0)
+    }
+
+    fn in16(&mut self, port: u16) -> u16 {
+        self.log.push(Access::In(port));
+        if self.dispi { 0xB0C5 } else { 0 }
+    }
+
+    fn store64(&mut self, at: u16, bytes: u64) {
+        self.log.push(Access::Store(at));
+        for (i, byte) in bytes.to_le_bytes().into_iter().enumerate() {
+            self.store(usize::from(at) + i, byte);
+        }
+    }
+
+    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        let mut staging = vec![0; usize::from(len - 1) * STRIDE + 1];
+        let base = NonNull::from(&mut staging[..]).cast();
+        // SAFETY: the staging bytes span the column and are reached by nothing else meanwhile.
+        draw(unsafe { Column::new(base, len) });
+        for row in 0..usize::from(len) {
+            let at = usize::from(at) + row * STRIDE;
+            self.log.push(Access::Store(at as u16));
+            self.store(at, staging[row * STRIDE]);
+        }
+    }
+}
+
+const BLACK: [[u8; 3]; 256] = [[0; 3]; 256];
+
+fn position(log: &[Access], access: Access) -> usize {
+    log.iter()
+        .position(|&a| a == access)
+        .unwrap_or_else(|| panic!("no {access:?}"))
+}
+
+#[test]
+fn the_mode_is_set_in_an_order_that_every_card_takes() {
+    let mut recorder = Recorder::new();
+    ModeX::set(&mut recorder, &BLACK).unwrap();
+    let log = &recorder.log;
+    // DISPI is off before any VGA register is touched.
+    let dispi_off = position(log, Access::Out16(DISPI_DATA, 0));
+    let vga = |a: &Access| matches!(a, Access::Out8(p, _) | Access::Out16(p, _) if *p >= 0x3C0);
+    assert!(log.iter().position(vga).unwrap() > dispi_off);
+    // The clock changes only in reset.
+    let misc = position(log, Access::Out8(MISC_WRITE, MODE_X.misc));
+    assert!(position(log, Access::Out16(SEQUENCER, 0x0100)) < misc);
+    assert!(misc < position(log, Access::Out16(SEQUENCER, 0x0300)));
+    // CR0 is written with the protection off, and it is on at the end.
+    let unprotected = position(log, Access::Out16(CRTC, 0x2C11));
+    assert!(unprotected < position(log, Access::Out16(CRTC, 0x5F00)));
+    assert_eq!(recorder.registers[&(CRTC, 0x11)], 0xAC);
+    // Attribute registers take no word writes.
+    assert!(!log.iter().any(|a| matches!(a, Access::Out16(ATTRIBUTE, _))));
+    // The screen is off until all is black, then on.
+    let on = position(log, Access::Out16(SEQUENCER, 0x0101));
+    let last_store = log.iter().rposition(|a| matches!(a, Access::Store(_)));
+    assert!(last_store.unwrap() < on);
+    assert!(recorder.planes.iter().flatten().all(|&byte| byte == 0));
+    for (index, &value) in (0..).zip(&MODE_X.crtc) {
+        assert_eq!(recorder.registers[&(CRTC, index)], value, "CR{index:02X}");
+    }
+    // All that without DISPI, too.
+    let mut cirrus = Recorder::new();
+    cirrus.dispi = false;
+    ModeX::set(&mut cirrus, &BLACK).unwrap();
+    assert!(!cirrus.log.contains(&Access::Out16(DISPI_DATA, 0)));
+}
+
+#[test]
+fn a_register_that_does_not_hold_is_named() {
+    for (stuck, block) in [
+        ((SEQUENCER, 4), "sequencer"),
+        ((CRTC, 0x17), "crtc"),
+        ((GRAPHICS, 5), "graphics"),
+        ((ATTRIBUTE, 0x10), "attribute"),
+    ] {
+        let mut recorder = Recorder::new();
+        recorder.stuck = Some(stuck);
+        let error = ModeX::set(&mut recorder, &BLACK).unwrap_err();
+        assert_eq!((error.block, error.index), (block, stuck.1));
+        assert_eq!(error.actual, 0);
+    }
+}
+
+/// The page's planes in the card, as a page in RAM.
+fn page(recorder: &Recorder, page: usize) -> PlanarBuffer {
+    let mut buffer = PlanarBuffer::new();
+    for (to, from) in buffer.planes.iter_mut().zip(&recorder.planes) {
+        to.copy_from_slice(&from[page * PAGE_BYTES..][..PAGE_BYTES]);
+    }
+    buffer
+}
+
+#[test]
+fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    let mut random = fastrand::Rng::with_seed(seed);
+    let background: [u8; HEIGHT] = std::array::from_fn(|y| y as u8 | 1);
+    let mut recorder = Recorder::new();
+    let mut card = ModeX::set(Counted::new(&mut recorder), &BLACK).unwrap();
+    for picture in 0..60 {
+        let columns: Vec<_> = (0..random.usize(0..40))
+            .map(|_| {
+                let (x, y) = (random.u16(0..WIDTH as u16), random.u16(0..HEIGHT as u16));
+                (x, y, random.u16(1..=HEIGHT as u16 - y), random.u8(..))
+            })
+            .collect();
+        let mut expected = PlanarBuffer::new();
+        expected.clear(&background);
+        card.bus().take_counts();
+        let mut canvas = card.begin(&background);
+        for &(x, y, len, colour) in &columns {
+            expected.column(x, y, len, |column| column.fill(|| colour));
+            canvas.column(x, y, len, |column| column.fill(|| colour));
+        }
+        card.flip();
+        let counts = *card.bus().counts();
+        assert_eq!(counts.draw.map_mask, columns.len() as u64);
+        assert_eq!(counts.draw.ports, columns.len() as u64);
+        assert_eq!((counts.erase.map_mask, counts.erase.ports), (1, 1));
+        assert_eq!(counts.flip.ports, 1);
+        let shown = card.shown_page();
+        assert_eq!(shown, (picture + 1) % PAGES);
+        let recorder = card.bus().inner();
+        assert_eq!(
+            recorder.registers[&(CRTC, START_ADDRESS_HIGH)],
+            [0, 0x4B, 0x96][shown]
+        );
+        assert!(page(recorder, shown) == expected, "picture {picture}");
+        // What lies behind the last page belongs to nobody.
+        assert!(
+            recorder
+                .planes
+                .iter()
+                .all(|plane| plane[PAGES * PAGE_BYTES..].iter().all(|&b| b == 0))
+        );
+    }
+}
+
+#[test]
+fn a_page_that_may_be_on_the_screen_is_not_drawn_on() {
+    let background = [0; HEIGHT];
+    let mut recorder = Recorder::new();
+    let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
+    for _ in 0..12 {
+        card.bus().log.clear();
+        card.begin(&background);
+        card.flip();
+        let log = &card.bus().log;
+        // The flip is written when the card was last seen displaying.
+        let flip = log
+            .iter()
+            .position(|a| matches!(a, Access::Out16(CRTC, _)))
+            .unwrap();
+        assert_eq!(log[flip - 1], Access::In(INPUT_STATUS_1));
+        assert_eq!(card.bus().status[0] & DISPLAY_DISABLED, 0);
+    }
+    // Three pages: the page after next was on the screen when the last flip was written, so
+    // every second picture waits for a retrace before its first store.
+    card.bus().status = vec![VERTICAL_RETRACE | DISPLAY_DISABLED, 0];
+    card.settle();
+    let mut waits = Vec::new();
+    for _ in 0..6 {
+        card.bus().log.clear();
+        card.begin(&background);
+        let log = &card.bus().log;
+        let erase = log
+            .iter()
+            .position(|a| matches!(a, Access::Out16(SEQUENCER, _)))
+            .unwrap();
+        waits.push(log[..erase].contains(&Access::In(INPUT_STATUS_1)));
+        card.flip();
+    }
+    assert_eq!(waits, [false, false, true, false, true, false]);
+}
+
+#[test]
+#[should_panic(expected = "never reported display")]
+fn a_dead_card_is_told_and_not_waited_for() {
+    let mut recorder = Recorder::new();
+    let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
+    card.bus().status = vec![0xFF];
+    card.begin(&[0; HEIGHT]);
+    card.flip();
+}
+
+#[test]
+#[should_panic(expected = "is not in the picture")]
+fn a_column_beyond_the_page_is_refused() {
+    PlanarBuffer::new().column(0, 200, 41, |column| column.fill(|| 0));
+}
