@@ -116,7 +116,7 @@ impl<B: Bus> ModeX<B> {
     pub fn reset(&mut self, palette: &Palette) -> Result<(), Readback> {
         let bus = &mut self.bus;
         bus.purpose(Purpose::Setup);
-        disable_dispi(bus);
+        leave_linear_mode(bus);
         write_mode(bus, &MODE_X);
         check_mode(bus, &MODE_X)?;
         write_palette(bus, palette);
@@ -243,14 +243,31 @@ fn write<B: Bus>(bus: &mut B, port: u16, index: u8, value: u8) {
     bus.out16(port, u16::from_le_bytes([index, value]));
 }
 
-/// Leaves the linear mode that the boot loader's VESA call left behind. While DISPI is enabled
-/// QEMU ignores the CRTC and scrambles planar writes. Adapters without it (Cirrus) read no
-/// B0Cx here and are left alone.
-fn disable_dispi<B: Bus>(bus: &mut B) {
+/// Leaves the linear mode that the boot loader's VESA call left behind, which no register of the
+/// plain VGA tells of.
+///
+/// While DISPI is enabled QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card
+/// has no DISPI (its ID reads no B0Cx); while its SR7 bit 0 is set, stores go to linear memory
+/// past Map Mask. Any other card is left alone.
+fn leave_linear_mode<B: Bus>(bus: &mut B) {
     bus.out16(DISPI_INDEX, DISPI_ID);
     if bus.in16(DISPI_DATA) & 0xFFF0 == 0xB0C0 {
         bus.out16(DISPI_INDEX, DISPI_ENABLE);
         bus.out16(DISPI_DATA, 0);
+        return;
+    }
+    write(bus, SEQUENCER, CIRRUS_UNLOCK, CIRRUS_KEY);
+    bus.out8(SEQUENCER, CIRRUS_UNLOCK);
+    if bus.in8(SEQUENCER + 1) == CIRRUS_KEY {
+        for (port, index) in CIRRUS_EXTENSIONS {
+            write(bus, port, index, 0);
+        }
+        // The card's DAC has a register of its own behind PEL Mask: it opens after four reads,
+        // and holds the colour depth of the linear mode.
+        for _ in 0..4 {
+            bus.in8(PEL_MASK);
+        }
+        bus.out8(PEL_MASK, 0);
     }
 }
 

@@ -35,6 +35,22 @@ pub const DISPI_ID: u16 = 0;
 /// DISPI index 4: enable.
 pub const DISPI_ENABLE: u16 = 4;
 
+/// SR6 of a Cirrus Logic card: unlocks its extensions, and reads back [`CIRRUS_KEY`] then.
+pub const CIRRUS_UNLOCK: u8 = 0x06;
+/// What unlocks them.
+pub const CIRRUS_KEY: u8 = 0x12;
+/// A Cirrus Logic card's own registers as a plain VGA mode needs them, zero all of them: SR7
+/// Extended Sequencer Mode, GR9 and GRA (banks), GRB Mode Extensions, CR1A, CR1B, CR1D.
+pub const CIRRUS_EXTENSIONS: [(u16, u8); 7] = [
+    (SEQUENCER, 0x07),
+    (GRAPHICS, 0x09),
+    (GRAPHICS, 0x0A),
+    (GRAPHICS, 0x0B),
+    (CRTC, 0x1A),
+    (CRTC, 0x1B),
+    (CRTC, 0x1D),
+];
+
 /// SR0 Reset.
 pub const RESET: u8 = 0x00;
 /// SR1 Clocking Mode; bit 5 turns the screen off.

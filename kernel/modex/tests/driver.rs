@@ -98,7 +98,7 @@ impl Bus for &mut Recorder {
                 return self.status[0];
             }
             MISC_READ => return self.registers[&(MISC_WRITE, 0)],
-            PEL_MASK => return self.registers[&(PEL_MASK, 0)],
+            PEL_MASK => return self.registers.get(&(PEL_MASK, 0)).copied().unwrap_or(0),
             ATTRIBUTE_READ => ATTRIBUTE,
             port => port - 1,
         };
@@ -166,11 +166,22 @@ fn the_mode_is_set_in_an_order_that_every_card_takes() {
     for (index, &value) in (0..).zip(&MODE_X.crtc) {
         assert_eq!(recorder.registers[&(CRTC, index)], value, "CR{index:02X}");
     }
-    // All that without DISPI, too.
+}
+
+#[test]
+fn a_card_without_dispi_leaves_its_own_linear_mode() {
     let mut cirrus = Recorder::new();
     cirrus.dispi = false;
     ModeX::set(&mut cirrus, &BLACK).unwrap();
     assert!(!cirrus.log.contains(&Access::Out16(DISPI_DATA, 0)));
+    assert_eq!(cirrus.registers[&(SEQUENCER, 7)], 0);
+    assert_eq!(cirrus.registers[&(CRTC, 0x1B)], 0);
+    // A card that does not take the key is not a Cirrus, and keeps its registers.
+    let mut other = Recorder::new();
+    other.dispi = false;
+    other.stuck = Some((SEQUENCER, CIRRUS_UNLOCK));
+    ModeX::set(&mut other, &BLACK).unwrap();
+    assert!(!other.registers.contains_key(&(SEQUENCER, 7)));
 }
 
 #[test]
