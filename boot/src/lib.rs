@@ -1,0 +1,5 @@
+//! The host program of Crystal Ball: set-up, disk image, QEMU and its verdict.
+
+pub mod child;
+pub mod machine;
+pub mod setup;

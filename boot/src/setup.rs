@@ -1,0 +1,115 @@
+//! The set-up that `cargo run` and `cargo test` do on first use, and nobody has to remember.
+//!
+//! Everything a run needs and a new machine lacks: the pinned compiler with its library sources, the boot
+//! loader built by it, the kernel, the disk image, a QEMU. Plain stable cargo is all the user has, and build
+//! scripts cannot do this (a nested cargo in the same target folder waits for ever), so the host program does.
+//!
+//! It is one locked step, done by every run and by every test that boots: cargo-nextest runs each test in a
+//! process of its own, and nothing here trusts that another process has finished. Whatever is kept in the
+//! [cache](cache) is made aside and renamed, so that it is whole or not there at every point where this
+//! program can be killed; what is found there is verified before use and made again when it is damaged.
+
+use std::io::Write;
+use std::path::PathBuf;
+
+mod build;
+mod cache;
+mod debian;
+mod doctor;
+mod pin;
+mod progress;
+mod qemu;
+mod rustup;
+mod toolchain;
+
+use cache::Cache;
+pub use qemu::Qemu;
+
+/// What the user may decide about the set-up.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// A complete Rust toolchain to use in place of the pinned one; `CRYSTAL_BALL_TOOLCHAIN` says the same.
+    pub toolchain: Option<PathBuf>,
+    /// The QEMU to use, in place of the one in `PATH`.
+    pub qemu: Option<PathBuf>,
+    /// A window is wanted: QEMU's window packages are looked for, too.
+    pub window: bool,
+}
+
+/// All that is needed to boot.
+#[derive(Debug, Clone)]
+pub struct Ready {
+    /// The bootable disk image.
+    pub image: PathBuf,
+    /// The kernel in it, as an ELF file.
+    pub kernel: PathBuf,
+    /// The QEMU to boot it with.
+    pub qemu: Qemu,
+}
+
+/// Does the whole set-up, or what is left of it to do.
+///
+/// # Errors
+/// When a part cannot be had: the message says what was tried, why it failed and what to do by hand.
+/// [`Interrupted`](crate::child::Interrupted) when the user stopped it.
+pub fn ready(options: &Options) -> anyhow::Result<Ready> {
+    let cache = Cache::find()?.lock()?;
+    // First, because it fails at once or asks a question, and the rest takes minutes.
+    let qemu = qemu::get(options)?;
+    let (kernel, image) = boot_files(&cache, options)?;
+    Ok(Ready {
+        image,
+        kernel,
+        qemu,
+    })
+}
+
+/// The disk image alone, which needs no QEMU.
+///
+/// # Errors
+/// As [`ready`].
+pub fn image(options: &Options) -> anyhow::Result<PathBuf> {
+    Ok(boot_files(&Cache::find()?.lock()?, options)?.1)
+}
+
+fn boot_files(cache: &cache::Locked, options: &Options) -> anyhow::Result<(PathBuf, PathBuf)> {
+    // Without a cargo the rest would be for nothing: this is known before the downloads.
+    build::cargo_path()?;
+    let toolchain = toolchain::get(cache, options)?;
+    let maker = build::image_maker(cache, &toolchain)?;
+    let kernel = build::kernel(&toolchain)?;
+    let image = build::image(&maker, &kernel)?;
+    Ok((kernel, image))
+}
+
+/// Tells what there is and what is missing, and installs nothing. True when a run has all it needs.
+///
+/// # Errors
+/// When `out` cannot be written or there is no place for a cache.
+pub fn doctor(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
+    doctor::report(options, out)
+}
+
+/// Removes the cache, and the kernel and image of this workspace; tells what, and returns the bytes freed.
+///
+/// # Errors
+/// When something cannot be removed.
+pub fn clean(out: &mut impl Write) -> anyhow::Result<u64> {
+    let cache = Cache::find()?.lock()?;
+    let mut freed = 0;
+    for folder in cache.contents()?.into_iter().chain(build::folders()) {
+        let bytes = cache::size(&folder);
+        if folder.exists() {
+            cache::remove(&folder)?;
+            writeln!(
+                out,
+                "removed {} ({})",
+                folder.display(),
+                progress::bytes(bytes)
+            )?;
+            freed += bytes;
+        }
+    }
+    writeln!(out, "{} freed", progress::bytes(freed))?;
+    Ok(freed)
+}

@@ -1,0 +1,219 @@
+//! The folder in which the set-up keeps what is costly to get, for all clones of this user.
+//!
+//! One lock file orders all set-ups. Things are made in a folder aside, in the same file system, and put in
+//! place by a rename. A killed run leaves at most its folder aside, which the next holder of the lock removes.
+
+use std::fs::{self, File, TryLockError};
+use std::ops::Deref;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use etcetera::BaseStrategy;
+use tempfile::TempDir;
+
+use super::progress::{bytes, say};
+use crate::child::{Interrupted, interrupted};
+
+const LOCK: &str = "lock";
+const ASIDE: &str = "aside";
+
+/// The cache folder, which may not exist yet.
+pub struct Cache {
+    folder: PathBuf,
+}
+
+impl Cache {
+    /// Where the cache is: the user's cache folder, by the XDG rules.
+    pub fn find() -> anyhow::Result<Self> {
+        let places = etcetera::base_strategy::Xdg::new().context(
+            "no home folder: set HOME or XDG_CACHE_HOME to a folder that can be written",
+        )?;
+        Ok(Self {
+            folder: places.cache_dir().join("crystal-ball"),
+        })
+    }
+
+    /// Makes the folder, waits for other set-ups, and removes what killed ones left.
+    pub fn lock(self) -> anyhow::Result<Locked> {
+        let unusable = || {
+            format!(
+                "the cache folder {} cannot be used; XDG_CACHE_HOME chooses another place",
+                self.folder.display()
+            )
+        };
+        fs::create_dir_all(&self.folder).with_context(unusable)?;
+        let lock = File::create(self.path(LOCK)).with_context(unusable)?;
+        wait(&lock)?;
+        let aside = self.path(ASIDE);
+        if aside.exists() {
+            remove(&aside)?;
+        }
+        fs::create_dir(&aside).with_context(unusable)?;
+        Ok(Locked {
+            cache: self,
+            _lock: lock,
+        })
+    }
+
+    /// The path of something kept.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.join(name)
+    }
+
+    /// The folder itself.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+}
+
+fn wait(lock: &File) -> anyhow::Result<()> {
+    let begun = Instant::now();
+    let mut said = false;
+    loop {
+        match lock.try_lock() {
+            Ok(()) => return Ok(()),
+            Err(TryLockError::Error(error)) => {
+                return Err(error).context("the cache cannot be locked");
+            }
+            Err(TryLockError::WouldBlock) if interrupted() => return Err(Interrupted.into()),
+            Err(TryLockError::WouldBlock) => {}
+        }
+        if !said && begun.elapsed() > Duration::from_secs(1) {
+            said = true;
+            say("waiting for another set-up to finish");
+        }
+        // Asked again and again, so that Ctrl-C is heard.
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// The cache while this process alone may change it.
+pub struct Locked {
+    cache: Cache,
+    _lock: File,
+}
+
+impl Deref for Locked {
+    type Target = Cache;
+
+    fn deref(&self) -> &Cache {
+        &self.cache
+    }
+}
+
+impl Locked {
+    /// A new folder to make something in.
+    pub fn aside(&self) -> anyhow::Result<TempDir> {
+        TempDir::new_in(self.path(ASIDE)).context("the cache cannot be written")
+    }
+
+    /// Puts what was made aside in its place; what was there is removed.
+    pub fn put(&self, made: &Path, name: &str) -> anyhow::Result<PathBuf> {
+        let place = self.path(name);
+        let old = self.aside()?;
+        if place.exists() {
+            fs::rename(&place, old.path().join("old"))?;
+        }
+        fs::rename(made, &place)
+            .with_context(|| format!("{} cannot be put in place", place.display()))?;
+        Ok(place)
+    }
+
+    /// Everything in the cache but the lock, which others may be waiting for.
+    pub fn contents(&self) -> anyhow::Result<Vec<PathBuf>> {
+        let entries = fs::read_dir(self.folder())?.collect::<Result<Vec<_>, _>>()?;
+        Ok(entries
+            .iter()
+            .map(|entry| entry.path())
+            .filter(|path| !path.ends_with(LOCK))
+            .collect())
+    }
+
+    /// Says no before a download that the disk has no room for.
+    pub fn room(&self, needed: u64, what: &str) -> anyhow::Result<()> {
+        let free = free(self.folder())?;
+        if free < needed {
+            bail!(
+                "{what} needs {} in {}, and {} are free: make room, or set XDG_CACHE_HOME to a folder on another disk",
+                bytes(needed),
+                self.folder().display(),
+                bytes(free)
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Free bytes for an ordinary user where `folder` is.
+pub fn free(folder: &Path) -> anyhow::Result<u64> {
+    let disk = rustix::fs::statvfs(folder)
+        .with_context(|| format!("the free space of {} is unknown", folder.display()))?;
+    Ok(disk.f_bavail * disk.f_frsize)
+}
+
+/// Removes a file or a folder with all that is in it.
+pub fn remove(path: &Path) -> anyhow::Result<()> {
+    if path.is_dir() && !path.is_symlink() {
+        fs::remove_dir_all(path)
+    } else {
+        fs::remove_file(path)
+    }
+    .with_context(|| format!("{} cannot be removed", path.display()))
+}
+
+/// The bytes of all files in a folder; what cannot be read counts nothing.
+pub fn size(path: &Path) -> u64 {
+    let Ok(data) = path.symlink_metadata() else {
+        return 0;
+    };
+    if !data.is_dir() {
+        return data.len();
+    }
+    fs::read_dir(path)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|entry| size(&entry.path()))
+        .sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_made_aside_replaces_what_was_there() {
+        let place = tempfile::tempdir().unwrap();
+        let locked = Cache {
+            folder: place.path().join("new"),
+        }
+        .lock()
+        .unwrap();
+        for content in ["first", "second"] {
+            let aside = locked.aside().unwrap();
+            fs::create_dir(aside.path().join("made")).unwrap();
+            fs::write(aside.path().join("made/file"), content).unwrap();
+            let kept = locked.put(&aside.path().join("made"), "kept").unwrap();
+            assert_eq!(fs::read_to_string(kept.join("file")).unwrap(), content);
+        }
+        assert_eq!(fs::read_dir(locked.path(ASIDE)).unwrap().count(), 0);
+        assert_eq!(size(&locked.path("kept")), 6);
+    }
+
+    #[test]
+    fn too_small_a_disk_is_said_before_the_download() {
+        let place = tempfile::tempdir().unwrap();
+        let locked = Cache {
+            folder: place.path().to_owned(),
+        }
+        .lock()
+        .unwrap();
+        locked.room(1, "a little").unwrap();
+        let error = locked.room(1 << 60, "the world").unwrap_err().to_string();
+        assert!(
+            error.starts_with("the world needs 1.00 EiB in ") && error.contains("are free"),
+            "{error}"
+        );
+    }
+}

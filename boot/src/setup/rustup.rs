@@ -1,0 +1,69 @@
+//! The pinned toolchain by way of rustup: one the user already has, or one of our own.
+//!
+//! A download goes to a private `RUSTUP_HOME`, from which only the toolchain's folder is kept: the user's own
+//! toolchains, default and settings stay as they are.
+
+use std::fs;
+use std::path::Path;
+
+use anyhow::{Context, bail};
+
+use super::cache::{self, Locked};
+use super::pin;
+use super::progress::Step;
+use super::toolchain::{self, Toolchain, offline};
+use crate::child;
+
+/// The user's own toolchain of the pinned version, if it is complete; used in place.
+pub fn installed() -> Option<Toolchain> {
+    let rustup = which::which("rustup").ok()?;
+    // Newer rustups install what they are asked about, which would change the user's toolchains.
+    let mut ask = child::command(rustup);
+    ask.args(["which", "--toolchain", pin::RUST, "rustc"])
+        .env("RUSTUP_AUTO_INSTALL", "0");
+    let rustc = child::run(&mut ask).ok()?;
+    let folder = Path::new(rustc.trim()).parent()?.parent()?;
+    Toolchain::check_pinned(folder).ok()
+}
+
+/// Downloads the pinned toolchain into the cache.
+pub fn download(cache: &Locked) -> anyhow::Result<Toolchain> {
+    if offline() {
+        bail!("cargo is offline (CARGO_NET_OFFLINE), so nothing is downloaded");
+    }
+    let rustup = which::which("rustup")
+        .ok()
+        .context("rustup is not installed")?;
+    cache.room(pin::RUSTUP_UNPACKED + pin::BUILDS, "Rust from rustup")?;
+    let home = cache.aside()?;
+    let mut install = child::family(rustup);
+    install.args([
+        "toolchain",
+        "install",
+        pin::RUST,
+        "--profile",
+        "minimal",
+        "--no-self-update",
+    ]);
+    install.args(["--component", "rust-src", "--component", "llvm-tools"]);
+    install
+        .env("RUSTUP_HOME", home.path())
+        .env_remove("RUSTUP_TOOLCHAIN");
+    let what = format!(
+        "getting Rust {} by rustup, once (about 15 s of work besides the download)",
+        pin::RUST
+    );
+    let mut step = Step::new(what, pin::RUSTUP_UNPACKED);
+    child::watch(&mut install, |event| {
+        step.on(event, || cache::size(home.path()))
+    })?;
+    drop(step);
+    let toolchains =
+        fs::read_dir(home.path().join("toolchains")).context("rustup installed nothing")?;
+    let made = toolchains
+        .flatten()
+        .next()
+        .context("rustup installed nothing")?
+        .path();
+    toolchain::keep(cache, &made)
+}
