@@ -1,0 +1,219 @@
+//! The `crystal-ball` command.
+
+use std::ffi::OsString;
+use std::fs::{File, Permissions};
+use std::io::{self, Write};
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use anyhow::Context;
+use clap::{Args, Parser, Subcommand};
+use crystal_ball::child;
+use crystal_ball::machine::{Config, Failure, Machine, Verdict};
+use crystal_ball::setup::{self, Options, Ready};
+
+/// How long the ball turns before its picture is taken without a display.
+const WARM_UP: Duration = Duration::from_secs(1);
+
+/// Boots Crystal Ball: a textured ball that turns in VGA Mode X, on a machine without an
+/// operating system.
+///
+/// On first use it fetches a compiler into your cache folder and, where that is allowed, installs
+/// QEMU; it says what it does. Close the window or type Ctrl-C to end it. Without a display it
+/// boots all the same and leaves a picture.
+#[derive(Debug, Parser)]
+#[command(version, after_help = AFTER_HELP)]
+struct Cli {
+    #[command(subcommand)]
+    command: Option<Subcommands>,
+    #[command(flatten)]
+    boot: Boot,
+    #[command(flatten)]
+    tools: Tools,
+    /// More arguments for QEMU, after `--`
+    #[arg(last = true, value_name = "QEMU ARGUMENTS")]
+    qemu_arguments: Vec<OsString>,
+}
+
+const AFTER_HELP: &str = "\
+Examples (`cargo run -- ` hands on what follows):
+  cargo run                            boot and watch
+  cargo run -- --headless              boot without a window, leave a picture
+  cargo run -- --vga cirrus            on another display adapter
+  cargo run -- -- -machine q35 -m 64   with more arguments for QEMU
+  cargo run -- doctor                  what is set up, and where
+  cargo run -- image --out ball.img    the disk image, for another emulator
+
+Exit codes: 0 done; 1 set-up failed; 2 wrong usage; 10 panic; 11 CPU exception; 12 triple fault;
+13 hang; 14 stopped in the boot loader; 15 QEMU failed; 16 serial line garbled; 130 ended by you.";
+
+#[derive(Debug, Args)]
+struct Boot {
+    /// Boot without a window and leave a picture
+    #[arg(long)]
+    headless: bool,
+    /// QEMU's display adapter: std, cirrus, vmware or virtio
+    #[arg(long, default_value = "std")]
+    vga: String,
+}
+
+#[derive(Debug, Args)]
+struct Tools {
+    /// QEMU's program [default: qemu-system-x86_64 in PATH]
+    #[arg(long, global = true, value_name = "PATH")]
+    qemu: Option<PathBuf>,
+    /// A complete Rust toolchain with library sources, llvm-tools and rust-lld, in place of the
+    /// pinned one
+    #[arg(long, global = true, value_name = "DIR")]
+    toolchain: Option<PathBuf>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Subcommands {
+    /// Tell what is set up, where, and what is missing; install nothing
+    Doctor,
+    /// Remove what the set-up keeps, and say how much that was
+    Clean,
+    /// Write the bootable disk image
+    Image {
+        /// The file to write
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    child::catch_interrupts();
+    match run(cli) {
+        Ok(code) => code,
+        Err(error) => {
+            let mut message = format!("error: {error:#}");
+            let code = if let Some(failure) = error.downcast_ref::<Failure>() {
+                if failure.verdict == Verdict::User {
+                    message = failure.to_string();
+                }
+                failure.verdict.exit_code()
+            } else if let Some(interrupted) = error.downcast_ref::<child::Interrupted>() {
+                message = interrupted.to_string();
+                child::Interrupted::EXIT_CODE as u8
+            } else {
+                1
+            };
+            // With standard error closed there is nobody to tell.
+            let _ = writeln!(io::stderr(), "{message}");
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn run(cli: Cli) -> anyhow::Result<ExitCode> {
+    let mut options = Options {
+        toolchain: cli.tools.toolchain,
+        qemu: cli.tools.qemu,
+        window: false,
+    };
+    match cli.command {
+        Some(Subcommands::Doctor) => {
+            options.window = has_display();
+            let whole = setup::doctor(&options, &mut io::stdout().lock())?;
+            return Ok(if whole {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
+            });
+        }
+        Some(Subcommands::Clean) => {
+            setup::clean(&mut io::stdout().lock())?;
+        }
+        Some(Subcommands::Image { out }) => write_image(&setup::image(&options)?, &out)?,
+        None => {
+            options.window = !cli.boot.headless && has_display();
+            let ready = setup::ready(&options)?;
+            watch(&ready, &cli.boot, cli.qemu_arguments)?;
+        }
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Whether there is a display that a window could open on.
+fn has_display() -> bool {
+    let set = |name| std::env::var_os(name).is_some_and(|value| !value.is_empty());
+    set("DISPLAY") || set("WAYLAND_DISPLAY")
+}
+
+/// Boots the image and lets the user watch, or takes a picture where there is nothing to watch on.
+fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result<()> {
+    let displays = &ready.qemu.displays;
+    let window = ["gtk", "sdl"]
+        .into_iter()
+        .find(|window| displays.iter().any(|display| display == window))
+        .filter(|_| !boot.headless && has_display());
+    let folder = ready.image.parent().context("the image lies in a folder")?;
+    if window.is_none() && !boot.headless {
+        let why = if has_display() {
+            "this QEMU has no window (on Debian the package qemu-system-gui brings one)"
+        } else {
+            "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+        };
+        eprintln!("{why}: booting without a window");
+    }
+    let start = Instant::now();
+    eprintln!("booting in QEMU {}", ready.qemu.version);
+    let mut machine = Machine::boot(&Config {
+        qemu: ready.qemu.path.clone(),
+        image: ready.image.clone(),
+        vga: boot.vga.clone(),
+        display: window.unwrap_or("none").to_string(),
+        arguments,
+        failures: folder.join("failures"),
+    })?;
+    machine.wait_until_running()?;
+    let seconds = start.elapsed().as_secs_f64();
+    eprintln!("the first picture is on the screen after {seconds:.1} s");
+    if window.is_some() {
+        eprintln!("close the window or type Ctrl-C to end it");
+        return machine.watch();
+    }
+    machine.rest(WARM_UP)?;
+    let picture = folder.join("picture.png");
+    let screen = machine.screendump()?;
+    write_aside(&picture, |file| {
+        Ok(screen.write_to(file, image::ImageFormat::Png)?)
+    })?;
+    machine.leave()?;
+    eprintln!("a picture of the running ball:");
+    println!("{}", picture.display());
+    Ok(())
+}
+
+fn write_image(image: &Path, out: &Path) -> anyhow::Result<()> {
+    let mut from = File::open(image).with_context(|| format!("{} is gone", image.display()))?;
+    let bytes = write_aside(out, |file| Ok(io::copy(&mut from, file)?))?;
+    eprintln!(
+        "{}: {bytes} bytes; boots on a PC BIOS with a VGA",
+        out.display()
+    );
+    Ok(())
+}
+
+/// Writes a file beside its place and renames it: it is whole or not there.
+fn write_aside<T>(
+    path: &Path,
+    write: impl FnOnce(&mut File) -> anyhow::Result<T>,
+) -> anyhow::Result<T> {
+    let folder = match path.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    let context = || format!("{} cannot be written", path.display());
+    let mut file = tempfile::Builder::new()
+        .permissions(Permissions::from_mode(0o666))
+        .tempfile_in(folder)
+        .with_context(context)?;
+    let written = write(file.as_file_mut()).with_context(context)?;
+    file.persist(path).with_context(context)?;
+    Ok(written)
+}

@@ -1,0 +1,495 @@
+//! The release image in real QEMU, without a window.
+//!
+//! Each test boots a machine of its own, so that one failure leaves the others alone; set-up is
+//! one locked step that all of them take.
+
+use std::os::unix::process::ExitStatusExt;
+use std::path::Path;
+use std::process::{Command as Process, Output, Stdio};
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
+
+use crystal_ball::machine::{Config, Failure, Machine, Verdict};
+use crystal_ball::setup::{self, Options, Ready};
+use image::{Rgb, RgbImage};
+use link::{Command, Fault};
+use modex::registers::MODE_X;
+use modex::{HEIGHT, PlanarBuffer, WIDTH};
+use scene::{Pose, Scene, Stage, Storage};
+use texmap::Stats;
+
+static READY: LazyLock<Ready> =
+    LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
+
+fn config() -> Config {
+    Config {
+        qemu: READY.qemu.path.clone(),
+        image: READY.image.clone(),
+        vga: "std".into(),
+        display: "none".into(),
+        arguments: Vec::new(),
+        failures: READY.image.with_file_name("failures"),
+    }
+}
+
+fn boot() -> Machine {
+    Machine::boot(&config()).expect("boots")
+}
+
+/// What went wrong, for a run that must not go well.
+fn verdict<T: std::fmt::Debug>(result: anyhow::Result<T>) -> Failure {
+    let error = result.expect_err("the run ended well");
+    error.downcast().expect("a failure with a verdict")
+}
+
+/// The host's own picture of a frame, drawn on a cleared page in RAM, and what it took.
+fn host_picture(frames: &[u32]) -> Vec<(RgbImage, Stats)> {
+    let mut texels = Box::new([0; scene::TEXELS]);
+    scene::paint_ball(&mut texels);
+    let textures = [scene::ball_texture(&texels[..]).unwrap()];
+    let scene = scene::ball(&textures);
+    let mut storage = Box::new(Storage::new());
+    let mut stage = Stage::new(&mut storage, scene);
+    let picture = |&frame: &u32| {
+        let mut page = Box::new(PlanarBuffer::new());
+        page.clear(scene.background);
+        let stats = stage.draw(&Pose::at_tick(frame), &mut *page);
+        (as_shown(&page, &scene), stats)
+    };
+    frames.iter().map(picture).collect()
+}
+
+/// A page as QEMU shows it: every pixel two by two, six bits widened to eight as its DAC does.
+fn as_shown(page: &PlanarBuffer, scene: &Scene<'_>) -> RgbImage {
+    RgbImage::from_fn(2 * WIDTH as u32, 2 * HEIGHT as u32, |x, y| {
+        let colour = page.pixel(x as usize / 2, y as usize / 2);
+        Rgb(scene.palette[usize::from(colour)].map(|v| (v << 2) | ((v & 1) * 3)))
+    })
+}
+
+#[test]
+fn the_registers_read_back_as_the_table_says() {
+    let mut machine = boot();
+    machine.ask(Command::Show(0)).unwrap();
+    let answer = machine.ask(Command::Registers).unwrap();
+    for ((block, expected), line) in MODE_X.blocks().into_iter().zip(&answer) {
+        let (name, values) = line.split_once(' ').unwrap();
+        assert_eq!(name, block);
+        let read = values
+            .split(' ')
+            .map(|v| u8::from_str_radix(v, 16).unwrap());
+        let mut read: Vec<u8> = read.collect();
+        match block {
+            // The last column's plane.
+            "sequencer" => assert!([1, 2, 4, 8].contains(&std::mem::replace(&mut read[2], 0x0F))),
+            // Page 1: the start address is what a flip changes.
+            "crtc" => assert_eq!(std::mem::replace(&mut read[0x0C], 0), 0x4B),
+            // QEMU has none.
+            "pel-mask" => continue,
+            _ => {}
+        }
+        assert_eq!(read, expected, "{block}");
+    }
+    assert_eq!(answer.len(), MODE_X.blocks().len());
+    machine.leave().unwrap();
+}
+
+/// Frames in an order that puts different pictures on the same page, and the same picture on
+/// different pages: after any order a page is what a cleared one would be.
+#[test]
+fn every_page_shows_the_picture_that_the_host_draws() {
+    let frames = [
+        0,
+        1000,
+        u32::MAX,
+        0,
+        360,
+        90,
+        90,
+        90,
+        90,
+        180,
+        7,
+        u32::MAX,
+        0,
+    ];
+    let expected = host_picture(&frames);
+    let mut machine = boot();
+    for (i, (frame, (picture, _))) in frames.iter().zip(&expected).enumerate() {
+        let answer = machine.ask(Command::Show(*frame)).unwrap();
+        assert_eq!(answer, [format!("page {}", (i + 1) % 3)]);
+        assert_same(
+            &machine.screendump().unwrap(),
+            picture,
+            &format!("frame {frame}"),
+        );
+    }
+    machine.leave().unwrap();
+    // Three pictures of a scene, and not one of them three times, nor a blank one.
+    let colours: Vec<_> = expected[..3]
+        .iter()
+        .map(|(p, _)| p.pixels().collect::<std::collections::HashSet<_>>().len())
+        .collect();
+    assert!(
+        colours.iter().all(|&count| count > 60),
+        "{colours:?} colours"
+    );
+    for (a, b) in [(0, 1), (1, 2), (0, 2)] {
+        assert!(
+            expected[a].0 != expected[b].0,
+            "{a} and {b} are the same picture"
+        );
+    }
+}
+
+fn assert_same(shown: &RgbImage, drawn: &RgbImage, what: &str) {
+    assert_eq!(shown.dimensions(), drawn.dimensions(), "{what}");
+    let differ = shown.enumerate_pixels().zip(drawn.pixels());
+    let mut differ = differ.filter(|((_, _, a), b)| a != b);
+    if let Some(((x, y, shown), drawn)) = differ.next() {
+        let (x, y, count) = (x / 2, y / 2, differ.count() + 1);
+        panic!(
+            "{what}: {count} of 307200 differ, the first is ({x}, {y}): {shown:?}, not {drawn:?}"
+        );
+    }
+}
+
+#[test]
+fn every_adapter_with_a_vga_core_shows_the_same() {
+    let (picture, _) = host_picture(&[480]).remove(0);
+    for (vga, arguments) in [
+        ("cirrus", ""),
+        ("vmware", ""),
+        ("virtio", ""),
+        ("std", "-machine q35"),
+        // QEMU's plain retrace flickers at every read; this one has the card's own timing.
+        ("std,retrace=precise", ""),
+    ] {
+        let mut config = config();
+        config.vga = vga.into();
+        config.arguments = arguments.split_whitespace().map(Into::into).collect();
+        let what = format!("-vga {vga} {arguments}");
+        let mut machine = Machine::boot(&config).unwrap_or_else(|error| panic!("{what}: {error}"));
+        machine.ask(Command::Show(480)).expect(&what);
+        assert_same(&machine.screendump().unwrap(), &picture, &what);
+        machine.leave().expect(&what);
+    }
+}
+
+#[test]
+fn map_mask_is_written_once_for_each_column() {
+    let mut machine = boot();
+    for (frame, (_, stats)) in [0, 1000, u32::MAX]
+        .iter()
+        .zip(host_picture(&[0, 1000, u32::MAX]))
+    {
+        machine.ask(Command::Show(*frame)).unwrap();
+        let counts = machine.ask(Command::Counts).unwrap();
+        let number = |line: &str, name: &str| -> u32 {
+            let line = counts
+                .iter()
+                .find(|l| l.split(' ').next() == Some(line))
+                .unwrap();
+            let mut words = line.split(' ').skip_while(|word| *word != name);
+            words.nth(1).unwrap().parse().unwrap()
+        };
+        assert_eq!(number("picture", "columns"), stats.columns);
+        assert_eq!(number("draw", "map-mask"), stats.columns);
+        assert_eq!(number("draw", "ports"), stats.columns);
+        assert_eq!(number("draw", "bytes"), stats.pixels);
+        assert_eq!(number("picture", "pixels"), stats.pixels);
+        assert!(number("erase", "map-mask") <= 1);
+        assert_eq!(number("flip", "ports"), 1);
+        assert_eq!(
+            (number("picture", "dropped"), number("picture", "full")),
+            (0, 0)
+        );
+    }
+    machine.leave().unwrap();
+}
+
+#[test]
+fn the_running_show_paces_itself_and_can_be_held() {
+    let mut machine = boot();
+    machine.wait_until_running().unwrap();
+    let pictures = |machine: &mut Machine| -> Option<u32> {
+        let counts = machine.ask(Command::Counts).unwrap();
+        let pace = counts.iter().find(|line| line.starts_with("pace "))?;
+        Some(pace.split(' ').nth(2).unwrap().parse().unwrap())
+    };
+    let (before, since) = (pictures(&mut machine).unwrap(), Instant::now());
+    machine.rest(Duration::from_secs(2)).unwrap();
+    let shown = pictures(&mut machine).unwrap() - before;
+    let most = since.elapsed().as_millis() as u32 * 61 / 1000 + 2;
+    // At most one picture a tick, and on the slowest machine some.
+    assert!(
+        (1..=most).contains(&shown),
+        "{shown} pictures, at most {most}"
+    );
+    machine.ask(Command::Hold).unwrap();
+    assert_eq!(pictures(&mut machine), None);
+    let still = machine.screendump().unwrap();
+    machine.rest(Duration::from_millis(300)).unwrap();
+    assert!(
+        still == machine.screendump().unwrap(),
+        "the held picture changed"
+    );
+    machine.ask(Command::Run).unwrap();
+    machine.wait_until_running().unwrap();
+    machine.leave().unwrap();
+}
+
+#[test]
+fn noise_on_the_line_is_answered_and_survived() {
+    let mut machine = boot();
+    machine.ask(Command::Hold).unwrap();
+    for (noise, reason) in [
+        (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
+        (vec![b'x'; 100_000], "more than 512 bytes"),
+        (b"show 4294967296\n".to_vec(), "a frame number"),
+        (b"shew 1\n".to_vec(), "no command 'shew'"),
+        (b"show 1 *00000000\n".to_vec(), "says checksum 00000000"),
+    ] {
+        machine.send_raw(&noise).unwrap();
+        if !noise.ends_with(b"\n") {
+            machine.send_raw(b"\n").unwrap();
+        }
+        let answer = machine.answer("noise").unwrap();
+        assert!(
+            answer[0].starts_with("error ") && answer[0].contains(reason),
+            "{answer:?}"
+        );
+    }
+    // A command in two parts, and one as a terminal sends it.
+    machine.send_raw(b"sho").unwrap();
+    machine.rest(Duration::from_millis(50)).unwrap();
+    machine.send_raw(b"w 3\r\n").unwrap();
+    assert_eq!(
+        machine.answer("show 3").unwrap().last().unwrap(),
+        "ok show 3"
+    );
+    machine.leave().unwrap();
+}
+
+/// Asks the kernel to break, and returns how that was judged.
+fn failure(fault: Fault) -> Failure {
+    let mut machine = boot();
+    let failure = verdict(machine.ask(Command::Fail(fault)));
+    let evidence = failure.evidence.as_deref().expect("evidence is kept");
+    for name in ["command.txt", "serial.log", "screen.png"] {
+        assert!(
+            evidence.join(name).exists(),
+            "{name} is missing in {}",
+            evidence.display()
+        );
+    }
+    std::fs::remove_dir_all(evidence).unwrap();
+    failure
+}
+
+#[test]
+fn a_panic_is_told_with_its_place() {
+    let failure = failure(Fault::Panic);
+    let Verdict::Panic { report } = &failure.verdict else {
+        panic!("{failure}");
+    };
+    assert!(
+        report[0].starts_with("panic at kernel/src/machine.rs:"),
+        "{report:?}"
+    );
+    assert_eq!(report[1], "asked to, by 'fail panic'");
+}
+
+#[test]
+fn an_exception_is_told_with_its_registers() {
+    let failure = failure(Fault::PageFault);
+    let Verdict::Exception { report } = &failure.verdict else {
+        panic!("{failure}");
+    };
+    assert_eq!(report[0], "exception page fault (vector 14)");
+    assert!(report[1].ends_with("cr2 0000000000000040"), "{report:?}");
+    let all = report.join(" ");
+    for register in ["rip", "rsp", "rflags", "rax", "r15", "cs", "ss"] {
+        assert!(
+            all.contains(&format!("{register} 0")),
+            "{register} is missing: {report:?}"
+        );
+    }
+}
+
+#[test]
+fn a_stack_overflow_has_its_name() {
+    let failure = failure(Fault::StackOverflow);
+    let Verdict::Exception { report } = &failure.verdict else {
+        panic!("{failure}");
+    };
+    assert!(
+        report[0].starts_with("exception stack overflow"),
+        "{report:?}"
+    );
+}
+
+#[test]
+fn a_triple_fault_is_no_success() {
+    let failure = failure(Fault::TripleFault);
+    assert_eq!(failure.verdict, Verdict::TripleFault { booted: false });
+}
+
+#[test]
+fn a_hang_is_noticed() {
+    let failure = failure(Fault::Hang);
+    let waited_for = "the answer to 'fail hang'".into();
+    assert_eq!(failure.verdict, Verdict::Hang { waited_for });
+}
+
+#[test]
+fn a_boot_loader_without_its_adapter_is_named() {
+    for (vga, reset) in [("none", false), ("-device bochs-display", true)] {
+        let mut config = config();
+        config.vga = "none".into();
+        if vga != "none" {
+            config.arguments = vga.split(' ').map(Into::into).collect();
+        }
+        let failure = verdict(Machine::boot(&config));
+        assert_eq!(failure.verdict, Verdict::BootLoader { reset }, "{vga}");
+        assert!(failure.to_string().contains("display adapter"), "{failure}");
+    }
+}
+
+#[test]
+fn an_unknown_exit_is_qemus_failure_in_its_words() {
+    let mut config = config();
+    config.vga = "nonsense".into();
+    let failure = verdict(Machine::boot(&config));
+    let Verdict::Qemu { words, .. } = &failure.verdict else {
+        panic!("{failure}");
+    };
+    assert!(
+        words.iter().any(|line| line.contains("nonsense")),
+        "{words:?}"
+    );
+}
+
+#[test]
+fn a_killed_qemu_is_neither_success_nor_the_kernels_fault() {
+    let mut machine = boot();
+    signal("KILL", machine.process());
+    let failure = verdict(
+        machine
+            .wait_until_running()
+            .and_then(|()| machine.wait_for_end()),
+    );
+    let Verdict::Qemu { status, .. } = &failure.verdict else {
+        panic!("{failure}");
+    };
+    assert_eq!(status.unwrap().signal(), Some(9));
+}
+
+#[test]
+fn a_qemu_ended_by_the_user_is_so_named() {
+    let machine = boot();
+    signal("TERM", machine.process());
+    let failure = verdict(machine.watch());
+    assert_eq!(failure.verdict, Verdict::User);
+}
+
+fn signal(name: &str, process: u32) {
+    let sent = Process::new("kill")
+        .args(["-s", name, &process.to_string()])
+        .status();
+    assert!(sent.unwrap().success());
+}
+
+/// Runs the host program itself.
+fn crystal_ball(arguments: &[&str]) -> Output {
+    let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
+    program
+        .args(arguments)
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY");
+    program.stdin(Stdio::null()).output().unwrap()
+}
+
+#[test]
+fn without_a_display_a_picture_is_left() {
+    LazyLock::force(&READY);
+    let output = crystal_ball(&[]);
+    let words = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{words}");
+    assert!(words.contains("there is no display"), "{words}");
+    let picture = String::from_utf8(output.stdout).unwrap();
+    let picture = image::open(Path::new(picture.trim())).unwrap().into_rgb8();
+    assert_eq!(picture.dimensions(), (640, 480));
+    let (expected, _) = &host_picture(&[0])[0];
+    // The sky at the left edge, where the ball never is: the mode, the palette and the page are
+    // right whatever the tick was.
+    let edge = |picture: &RgbImage| {
+        (0..480)
+            .map(|y| *picture.get_pixel(3, y))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(edge(&picture), edge(expected));
+}
+
+#[test]
+fn exit_codes_tell_the_verdicts_apart() {
+    LazyLock::force(&READY);
+    for (arguments, code, words) in [
+        (&["--vga", "nonsense"][..], 15, "QEMU itself failed"),
+        (
+            &[
+                "--vga",
+                "none",
+                "--headless",
+                "--",
+                "-device",
+                "bochs-display",
+            ],
+            14,
+            "boot loader",
+        ),
+        (&["--qemu", "/nowhere/qemu"], 1, "/nowhere/qemu"),
+        (&["--no-such-flag"], 2, "unexpected argument"),
+    ] {
+        let output = crystal_ball(arguments);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+}
+
+#[test]
+fn whatever_ends_the_program_ends_qemu() {
+    LazyLock::force(&READY);
+    for (name, code) in [("INT", Some(130)), ("TERM", Some(130)), ("KILL", None)] {
+        let folder = tempfile::tempdir().unwrap();
+        let pidfile = folder.path().join("pid");
+        let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
+        // A machine that never reaches the kernel: the program waits for it.
+        program
+            .args(["--headless", "--vga", "none", "--", "-pidfile"])
+            .arg(&pidfile);
+        let mut program = program.stderr(Stdio::null()).spawn().unwrap();
+        let qemu = wait_for("QEMU's start", || {
+            let pid = std::fs::read_to_string(&pidfile).ok()?;
+            pid.ends_with('\n')
+                .then(|| Path::new("/proc").join(pid.trim()))
+        });
+        assert!(qemu.exists());
+        signal(name, program.id());
+        assert_eq!(program.wait().unwrap().code(), code, "{name}");
+        wait_for("QEMU's end", || (!qemu.exists()).then_some(()));
+    }
+}
+
+/// Asks again and again, for a minute at most.
+fn wait_for<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
+    let by = Instant::now() + Duration::from_secs(60);
+    loop {
+        if let Some(answer) = ask() {
+            return answer;
+        }
+        assert!(Instant::now() < by, "{what} did not come");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
