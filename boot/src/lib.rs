@@ -2,4 +2,5 @@
 
 pub mod child;
 pub mod machine;
+pub mod screen;
 pub mod setup;

@@ -28,7 +28,6 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
-use image::RgbImage;
 use link::{Command, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, Lines, OK, PANIC, RUNNING};
 use rustix::process::{Pid, Signal, kill_process, test_kill_process};
 use serde_json::{Value, json};
@@ -37,6 +36,7 @@ use tempfile::TempDir;
 pub use verdict::{Failure, Verdict};
 
 use crate::child;
+use crate::screen::Screen;
 
 /// From starting QEMU to the kernel's first line: ten times and more what it takes alone on a
 /// slow machine with two cores.
@@ -254,14 +254,14 @@ impl Machine {
     ///
     /// # Errors
     /// A [`Failure`], or what is wrong with QEMU's picture.
-    pub fn screendump(&mut self) -> anyhow::Result<RgbImage> {
+    pub fn screendump(&mut self) -> anyhow::Result<Screen> {
         let file = self.folder.path().join("screen.ppm");
         let answer = self.control("screendump", json!({ "filename": file }))?;
         if let Some(error) = answer.get("error") {
             return Err(anyhow!("QEMU takes no screendump: {error}"));
         }
-        let picture = image::open(&file).context("QEMU's screendump is no picture")?;
-        Ok(picture.into_rgb8())
+        let bytes = std::fs::read(&file).context("QEMU wrote no screendump")?;
+        Screen::from_ppm(&bytes).context("QEMU's screendump is no picture")
     }
 
     /// Asks the kernel to leave, and waits until QEMU has ended by it.
@@ -469,11 +469,13 @@ impl Machine {
                 break;
             }
         }
-        if let Ok(picture) = image::open(&file) {
-            // Evidence that can't be kept must not hide the failure that it is about.
-            let _ = picture.save(self.folder.path().join("screen.png"));
-        }
-        let _ = std::fs::remove_file(file);
+        // Evidence that can't be kept must not hide the failure that it is about.
+        let _ = std::fs::read(&file)
+            .map_err(anyhow::Error::from)
+            .and_then(|bytes| Screen::from_ppm(&bytes))
+            .and_then(|screen| {
+                screen.write_png(File::create(self.folder.path().join("screen.png"))?)
+            });
     }
 
     /// Kills QEMU, if it has not ended, and waits until it has.

@@ -180,9 +180,7 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
     machine.rest(WARM_UP)?;
     let picture = folder.join("picture.png");
     let screen = machine.screendump()?;
-    write_aside(&picture, |file| {
-        Ok(screen.write_to(file, image::ImageFormat::Png)?)
-    })?;
+    write_aside(&picture, |file| screen.write_png(file))?;
     machine.leave()?;
     eprintln!("a picture of the running ball:");
     println!("{}", picture.display());
