@@ -16,9 +16,9 @@ const FACES: usize = SEGMENTS * (2 + (RINGS - 2) * 2);
 const CORNERS: usize = 3 * FACES;
 
 /// Texels across the texture: once around the ball.
-pub const TEXTURE_WIDTH: u16 = 240;
+pub const TEXTURE_WIDTH: u16 = paint::COLUMNS as u16;
 /// Texels down the texture: from pole to pole.
-pub const TEXTURE_HEIGHT: u16 = 180;
+pub const TEXTURE_HEIGHT: u16 = paint::ROWS as u16;
 /// Texels in the texture.
 pub const TEXELS: usize = TEXTURE_WIDTH as usize * TEXTURE_HEIGHT as usize;
 

@@ -8,12 +8,13 @@ use crate::Vec3;
 /// z; the middle of the screen is the corner between four pixels.
 pub const FOCAL_LENGTH: i32 = 258;
 
-/// Nearest z that is projected, 16.16: a thousandth of the distance at which a unit fills the
-/// screen, so that a projected position fits 32 bits for |x|, |y| up to 128 units.
+/// Nearest z that is projected, 16.16: a quarter of a unit. At it a point 128 units off the axis,
+/// the furthest that is legal, is at 2^25 of 1/256 pixel: it fits 32 bits, and the mapper tells
+/// that it is out of its range.
 pub const NEAR: i32 = 1 << 14;
 
 /// The screen position of a point in 16.16, rounded to 1/256 pixel (half up), or nothing if the
-/// point is nearer than [`NEAR`].
+/// point is nearer than [`NEAR`]. |x| and |y| are at most 2^23 (128 units).
 pub fn project(point: Vec3) -> Option<(i32, i32)> {
     let [x, y, z] = point.map(i64::from);
     if z < i64::from(NEAR) {

@@ -8,7 +8,6 @@
 //! degrees, and every wire has a dark edge, as in cloisonne: it keeps gold readable on any
 //! enamel, and hides the steps of its outline.
 
-use crate::ball::{TEXTURE_HEIGHT, TEXTURE_WIDTH};
 use crate::colour::Ramp;
 use crate::noise::{ONE, fractal, hash};
 use crate::trig::sin;
@@ -16,9 +15,9 @@ use crate::trig::sin;
 /// A degree as a fraction of a turn.
 const DEGREE: i64 = (1 << 32) / 360;
 /// Columns of the drawing grid, a texel each: once around.
-const COLUMNS: u64 = TEXTURE_WIDTH as u64;
+pub const COLUMNS: u64 = 240;
 /// Rows of the drawing grid, a texel and a degree each: from pole to pole.
-const ROWS: u64 = TEXTURE_HEIGHT as u64;
+pub const ROWS: u64 = 180;
 /// Columns from one sign of the zodiac to the next.
 const SIGN: i64 = 20;
 

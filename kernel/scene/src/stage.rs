@@ -133,7 +133,9 @@ impl<'a> Stage<'a> {
         for face in mesh.faces {
             let mut polygon = [Vertex::default(); MAX_SIDES];
             let polygon = &mut polygon[..usize::from(face.corners)];
-            if place(mesh, face, self.points, polygon) && looks_at_viewer(polygon) {
+            if !place(mesh, face, self.points, polygon) {
+                renderer.drop_polygon();
+            } else if looks_at_viewer(polygon) {
                 let level = lit_level(orientation.turn(face.normal));
                 let surface = usize::from(face.texture) * LIGHT_LEVELS + level;
                 renderer.polygon(polygon, surface as u16);

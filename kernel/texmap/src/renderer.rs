@@ -13,7 +13,7 @@ pub struct Stats {
     pub columns: u32,
     /// Pixels drawn.
     pub pixels: u32,
-    /// Polygons outside the legal range, not drawn.
+    /// Polygons outside the legal range or too near the eye, not drawn.
     pub dropped: u32,
     /// Times that the job list was full and had to be drawn before the picture was complete.
     pub full: u32,
@@ -67,6 +67,11 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
             Ok(()) => stats.polygons += 1,
             Err(_) => stats.dropped += 1,
         }
+    }
+
+    /// Counts a polygon that could not even be placed on the screen.
+    pub fn drop_polygon(&mut self) {
+        self.stats.dropped += 1;
     }
 
     /// Draws what is left and says what the picture took.
