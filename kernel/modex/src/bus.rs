@@ -3,7 +3,7 @@
 use crate::Column;
 
 /// Why an access is made, so that a bus that counts can count apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Purpose {
     /// Setting the mode, the palette, reading registers back.
     Setup,
@@ -39,4 +39,35 @@ pub trait Bus {
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>));
     /// Announces what the next accesses are for.
     fn purpose(&mut self, _purpose: Purpose) {}
+}
+
+/// A bus that is only lent, so that a driver can be put on a card that outlives it.
+impl<B: Bus> Bus for &mut B {
+    fn out8(&mut self, port: u16, value: u8) {
+        B::out8(self, port, value);
+    }
+
+    fn out16(&mut self, port: u16, value: u16) {
+        B::out16(self, port, value);
+    }
+
+    fn in8(&mut self, port: u16) -> u8 {
+        B::in8(self, port)
+    }
+
+    fn in16(&mut self, port: u16) -> u16 {
+        B::in16(self, port)
+    }
+
+    fn store64(&mut self, at: u16, bytes: u64) {
+        B::store64(self, at, bytes);
+    }
+
+    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        B::column(self, at, len, draw);
+    }
+
+    fn purpose(&mut self, purpose: Purpose) {
+        B::purpose(self, purpose);
+    }
 }

@@ -63,7 +63,7 @@ impl Recorder {
     }
 }
 
-impl Bus for &mut Recorder {
+impl Bus for Recorder {
     fn out8(&mut self, port: u16, value: u8) {
         self.log.push(Access::Out8(port, value));
         match port {

@@ -1,0 +1,73 @@
+//! The DAC: 256 colours of 6 bits each.
+
+use crate::fault::Complaint;
+
+/// The colours, and where the next part of one goes.
+#[derive(Clone, Debug)]
+pub(crate) struct Dac {
+    colours: [[Option<u8>; 3]; 256],
+    pel_mask: Option<u8>,
+    /// Entry and part of the next data write.
+    write: Option<(u8, usize)>,
+}
+
+impl Default for Dac {
+    fn default() -> Self {
+        Self {
+            colours: [[None; 3]; 256],
+            pel_mask: None,
+            write: None,
+        }
+    }
+}
+
+impl Dac {
+    pub fn pel_mask(&self) -> Option<u8> {
+        self.pel_mask
+    }
+
+    pub fn write_pel_mask(&mut self, value: u8) -> Result<(), Complaint> {
+        self.pel_mask = Some(value);
+        match value {
+            0xFF => Ok(()),
+            _ => Err(("unused value", format!("PEL Mask = {value:02X}h"))),
+        }
+    }
+
+    pub fn start_writing(&mut self, entry: u8) {
+        self.write = Some((entry, 0));
+    }
+
+    pub fn write_data(&mut self, value: u8) -> Result<(), Complaint> {
+        let Some((entry, part)) = self.write else {
+            return Err((
+                "DAC entry is unknown",
+                "PEL Address was never written".into(),
+            ));
+        };
+        // Only six bits are wired; QEMU keeps eight.
+        self.colours[usize::from(entry)][part] = Some(value & 0x3F);
+        self.write = Some(match part {
+            2 => (entry.wrapping_add(1), 0),
+            _ => (entry, part + 1),
+        });
+        match value {
+            0..=0x3F => Ok(()),
+            _ => Err(("DAC value is wider than 6 bits", format!("{value:02X}h"))),
+        }
+    }
+
+    /// The colour behind an index, as the monitor gets it.
+    pub fn colour(&self, index: u8) -> Result<[u8; 3], Complaint> {
+        let Some(mask) = self.pel_mask else {
+            return Err(("register was never written", "PEL Mask".into()));
+        };
+        match self.colours[usize::from(index & mask)] {
+            [Some(red), Some(green), Some(blue)] => Ok([red, green, blue]),
+            _ => Err((
+                "colour was never written",
+                format!("DAC entry {}", index & mask),
+            )),
+        }
+    }
+}

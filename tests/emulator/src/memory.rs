@@ -1,0 +1,47 @@
+//! Video memory: four planes, and the latches between them and the CPU.
+
+use modex::{PAGE_BYTES, PAGES, PLANE_BYTES};
+
+/// First byte behind the last page.
+pub(crate) const PAGES_END: usize = PAGES * PAGE_BYTES;
+
+/// Four planes of 64 KiB, and a latch for each.
+#[derive(Clone, Debug)]
+pub(crate) struct Memory {
+    planes: Vec<[u8; 4]>,
+    latches: [u8; 4],
+}
+
+impl Default for Memory {
+    /// Memory holds anything at power-on; this is a pattern that no scene draws.
+    fn default() -> Self {
+        Self {
+            planes: (0..PLANE_BYTES)
+                .map(|at| [0xA5 ^ at as u8, 0x5A, 0xC3, 0x3C])
+                .collect(),
+            latches: [0; 4],
+        }
+    }
+}
+
+impl Memory {
+    /// Write mode 0 with nothing rotated, masked or set: the byte goes to the planes of the mask.
+    pub fn store(&mut self, at: u16, value: u8, map_mask: u8) {
+        for (plane, byte) in self.planes[usize::from(at)].iter_mut().enumerate() {
+            if map_mask >> plane & 1 == 1 {
+                *byte = value;
+            }
+        }
+    }
+
+    /// Read mode 0: every load fills all four latches, and returns one.
+    pub fn load(&mut self, at: u16, plane: u8) -> u8 {
+        self.latches = self.planes[usize::from(at)];
+        self.latches[usize::from(plane & 3)]
+    }
+
+    /// A byte of a plane, without a latch being filled.
+    pub fn peek(&self, plane: usize, at: u16) -> u8 {
+        self.planes[usize::from(at)][plane]
+    }
+}

@@ -1,0 +1,395 @@
+//! The card: ports and window decoded, faults noted, accesses counted.
+
+use std::collections::BTreeMap;
+use std::ptr::NonNull;
+
+use modex::registers::*;
+use modex::{Bus, Column, PAGE_BYTES, Purpose, STRIDE};
+
+use crate::attribute::Attribute;
+use crate::crtc::Crtc;
+use crate::dac::Dac;
+use crate::fault::{Access, Complaint, Fault};
+use crate::graphics::Graphics;
+use crate::memory::{Memory, PAGES_END};
+use crate::scanout::Picture;
+use crate::sequencer::Sequencer;
+
+/// A card as the boot loader leaves it: in a linear mode, no VGA register known.
+#[derive(Debug)]
+pub struct Vga {
+    pub(crate) sequencer: Sequencer,
+    pub(crate) graphics: Graphics,
+    pub(crate) crtc: Crtc,
+    pub(crate) attribute: Attribute,
+    pub(crate) dac: Dac,
+    pub(crate) memory: Memory,
+    misc: Option<u8>,
+    dispi_index: Option<u16>,
+    /// Bochs DISPI's linear mode, in which the VGA's registers do nothing.
+    dispi: bool,
+    purpose: Purpose,
+    /// Port writes by purpose, port and (on an index port) index.
+    writes: BTreeMap<(Purpose, u16, Option<u8>), u64>,
+    /// Bytes stored by purpose.
+    stores: BTreeMap<Purpose, u64>,
+    log: Option<Vec<Access>>,
+    faults: Vec<Fault>,
+}
+
+impl Vga {
+    /// A card as the boot loader leaves it.
+    pub fn new() -> Self {
+        Self {
+            sequencer: Sequencer::default(),
+            graphics: Graphics::default(),
+            crtc: Crtc::default(),
+            attribute: Attribute::default(),
+            dac: Dac::default(),
+            memory: Memory::default(),
+            misc: None,
+            dispi_index: None,
+            dispi: true,
+            purpose: Purpose::Setup,
+            writes: BTreeMap::new(),
+            stores: BTreeMap::new(),
+            log: None,
+            faults: Vec::new(),
+        }
+    }
+
+    /// The faults so far; they are the caller's business now.
+    pub fn take_faults(&mut self) -> Vec<Fault> {
+        std::mem::take(&mut self.faults)
+    }
+
+    /// Remembers every access from here on.
+    pub fn start_log(&mut self) {
+        self.log = Some(Vec::new());
+    }
+
+    /// What was remembered; and remembers no more.
+    pub fn take_log(&mut self) -> Vec<Access> {
+        self.log.take().unwrap_or_default()
+    }
+
+    /// Port writes for a purpose to a port; on an index port to one register, whichever way it
+    /// was written.
+    pub fn port_writes(&self, purpose: Purpose, port: u16, index: Option<u8>) -> u64 {
+        self.writes
+            .get(&(purpose, port, index))
+            .copied()
+            .unwrap_or(0)
+    }
+
+    /// Port writes for a purpose.
+    pub fn all_port_writes(&self, purpose: Purpose) -> u64 {
+        let writes = self.writes.iter().filter(|((p, ..), _)| *p == purpose);
+        writes.map(|(_, count)| count).sum()
+    }
+
+    /// Bytes stored for a purpose.
+    pub fn bytes_stored(&self, purpose: Purpose) -> u64 {
+        self.stores.get(&purpose).copied().unwrap_or(0)
+    }
+
+    /// A byte of a plane, without the side effects of a load.
+    pub fn peek(&self, plane: usize, at: u16) -> u8 {
+        self.memory.peek(plane, at)
+    }
+
+    /// The picture on the monitor.
+    ///
+    /// # Errors
+    /// Why there is none, or a garbled one; that is no fault of an access, so it is not noted.
+    pub fn scan_out(&self) -> Result<Picture, Fault> {
+        Picture::of(self).map_err(|(name, state)| Fault {
+            name,
+            access: Access::ScanOut,
+            state,
+        })
+    }
+
+    /// Moves the beam until a retrace has begun, as a monitor would without any program.
+    pub fn finish_frame(&mut self) {
+        let frame = self.crtc.frames;
+        while self.crtc.frames == frame {
+            if let Err(complaint) = self.crtc.step() {
+                return self.note(Access::In8(INPUT_STATUS_1), Err(complaint));
+            }
+        }
+    }
+
+    fn note(&mut self, access: Access, outcome: Result<(), Complaint>) {
+        if let Err((name, state)) = outcome {
+            self.faults.push(Fault {
+                name,
+                access,
+                state,
+            });
+        }
+    }
+
+    fn log(&mut self, access: Access) {
+        if let Some(log) = &mut self.log {
+            log.push(access);
+        }
+    }
+
+    /// Every access to the VGA proper begins here.
+    fn begin(&mut self, access: Access) {
+        self.log(access);
+        if self.dispi {
+            let state = "DISPI is enabled: the CRTC is ignored, planes are scrambled".into();
+            self.note(access, Err(("card is in a linear mode", state)));
+        }
+    }
+
+    fn count(&mut self, port: u16, index: Option<u8>) {
+        *self.writes.entry((self.purpose, port, index)).or_default() += 1;
+    }
+
+    fn write_register(&mut self, access: Access, port: u16, index: u8, value: u8) {
+        self.count(port, Some(index));
+        let outcome = match port {
+            SEQUENCER => self.sequencer.write(index, value),
+            GRAPHICS => self.graphics.write(index, value),
+            _ => self.crtc.write(index, value),
+        };
+        self.note(access, outcome);
+    }
+
+    fn index(&mut self, port: u16) -> &mut Option<u8> {
+        match port {
+            SEQUENCER => &mut self.sequencer.index,
+            GRAPHICS => &mut self.graphics.index,
+            _ => &mut self.crtc.index,
+        }
+    }
+
+    fn write_misc(&mut self, value: u8) -> Result<(), Complaint> {
+        let old = self.misc.replace(value);
+        if value != MODE_X.misc {
+            return Err((
+                "unused value",
+                format!("Miscellaneous Output = {value:02X}h"),
+            ));
+        }
+        if old != Some(value) && !self.sequencer.in_reset() {
+            let state = "the clock may change only while SR0 = 01".into();
+            return Err(("Miscellaneous Output changed without reset", state));
+        }
+        Ok(())
+    }
+
+    /// What is wrong with reaching a byte of the window now.
+    fn check_memory(&self, at: u16) -> Result<(), Complaint> {
+        self.sequencer.check_memory()?;
+        self.graphics.check_window()?;
+        if usize::from(at) >= PAGES_END && self.purpose != Purpose::Setup {
+            return Err((
+                "address past the last page",
+                format!("pages end at {PAGES_END:04X}"),
+            ));
+        }
+        Ok(())
+    }
+
+    /// A store to a page that is on the screen, or will be at the next retrace, is seen.
+    fn check_hidden(&self, at: u16) -> Result<(), Complaint> {
+        if self.purpose == Purpose::Setup || !self.sequencer.screen_is_on() {
+            return Ok(());
+        }
+        for (start, what) in [
+            (self.crtc.shown_address(), "is on the screen"),
+            (self.crtc.start_address(), "will be on the screen"),
+        ] {
+            if let Some(start) = start
+                && usize::from(at.wrapping_sub(start)) < PAGE_BYTES
+            {
+                return Err((
+                    "store to a page that is seen",
+                    format!("the page at {start:04X} {what}"),
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn store(&mut self, at: u16, value: u8) {
+        let access = Access::Store(at, value);
+        self.begin(access);
+        *self.stores.entry(self.purpose).or_default() += 1;
+        let outcome = self.check_memory(at).and_then(|()| self.check_hidden(at));
+        self.note(access, outcome);
+        self.memory.store(at, value, self.sequencer.map_mask());
+    }
+
+    /// Loads a byte through the window.
+    pub fn load(&mut self, at: u16) -> u8 {
+        self.begin(Access::Load(at));
+        let outcome = self.check_memory(at);
+        self.note(Access::Load(at), outcome);
+        self.memory.load(at, self.graphics.read_map())
+    }
+
+    /// A register read that finds nothing known.
+    fn known(&mut self, access: Access, value: Option<u8>, what: &str) -> u8 {
+        if value.is_none() {
+            self.note(
+                access,
+                Err(("read of a register never written", what.to_owned())),
+            );
+        }
+        value.unwrap_or(0xFF)
+    }
+}
+
+impl Default for Vga {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Drop for Vga {
+    fn drop(&mut self) {
+        if !self.faults.is_empty() && !std::thread::panicking() {
+            let faults: Vec<_> = self.faults.iter().take(10).map(Fault::to_string).collect();
+            panic!(
+                "{} faults, the first:\n{}",
+                self.faults.len(),
+                faults.join("\n")
+            );
+        }
+    }
+}
+
+impl Bus for Vga {
+    fn out8(&mut self, port: u16, value: u8) {
+        let access = Access::Out8(port, value);
+        self.begin(access);
+        let outcome = match port {
+            SEQUENCER | GRAPHICS | CRTC => {
+                *self.index(port) = Some(value);
+                self.count(port, None);
+                return;
+            }
+            ATTRIBUTE => self.attribute.write(value),
+            MISC_WRITE => self.write_misc(value),
+            PEL_MASK => self.dac.write_pel_mask(value),
+            PEL_WRITE => {
+                self.dac.start_writing(value);
+                Ok(())
+            }
+            PEL_DATA => self.dac.write_data(value),
+            _ => Err(("unused port", format!("{port:03X}h"))),
+        };
+        self.count(port, None);
+        self.note(access, outcome);
+    }
+
+    fn out16(&mut self, port: u16, value: u16) {
+        let access = Access::Out16(port, value);
+        match port {
+            DISPI_INDEX => {
+                self.log(access);
+                self.dispi_index = Some(value);
+                self.count(port, None);
+            }
+            DISPI_DATA => {
+                self.log(access);
+                self.count(port, None);
+                let outcome = match (self.dispi_index, value) {
+                    (Some(DISPI_ENABLE), 0) => {
+                        self.dispi = false;
+                        Ok(())
+                    }
+                    (index, _) => Err(("unused value", format!("DISPI {index:?} = {value:04X}h"))),
+                };
+                self.note(access, outcome);
+            }
+            SEQUENCER | GRAPHICS | CRTC => {
+                self.begin(access);
+                let [index, data] = value.to_le_bytes();
+                *self.index(port) = Some(index);
+                self.write_register(access, port, index, data);
+            }
+            _ => {
+                self.begin(access);
+                self.count(port, None);
+                self.note(
+                    access,
+                    Err(("unused port", format!("word write to {port:03X}h"))),
+                );
+            }
+        }
+    }
+
+    fn in8(&mut self, port: u16) -> u8 {
+        let access = Access::In8(port);
+        self.begin(access);
+        let (value, what) = match port {
+            INPUT_STATUS_1 => {
+                self.attribute.reset_flip_flop();
+                return match self.crtc.step() {
+                    Ok(status) => status,
+                    // The attribute controller may be reached before the CRTC is set.
+                    Err(_) => DISPLAY_DISABLED,
+                };
+            }
+            MISC_READ => (self.misc, "Miscellaneous Output".to_owned()),
+            PEL_MASK => (self.dac.pel_mask(), "PEL Mask".to_owned()),
+            ATTRIBUTE_READ => (self.attribute.read(), "attribute controller".to_owned()),
+            port if [SEQUENCER, GRAPHICS, CRTC].contains(&port.wrapping_sub(1)) => {
+                let block = port - 1;
+                let index = *self.index(block);
+                let value = index.and_then(|index| match block {
+                    SEQUENCER => self.sequencer.read(index),
+                    GRAPHICS => self.graphics.read(index),
+                    _ => self.crtc.read(index),
+                });
+                (value, format!("{block:03X}h index {index:02X?}"))
+            }
+            _ => {
+                self.note(access, Err(("unused port", format!("{port:03X}h"))));
+                return 0xFF;
+            }
+        };
+        self.known(access, value, &what)
+    }
+
+    fn in16(&mut self, port: u16) -> u16 {
+        let access = Access::In16(port);
+        self.log(access);
+        match (port, self.dispi_index) {
+            (DISPI_DATA, Some(DISPI_ID)) => 0xB0C5,
+            _ => {
+                self.note(
+                    access,
+                    Err(("unused port", format!("word read of {port:03X}h"))),
+                );
+                0xFFFF
+            }
+        }
+    }
+
+    fn store64(&mut self, at: u16, bytes: u64) {
+        for (i, byte) in (0..).zip(bytes.to_le_bytes()) {
+            self.store(at.wrapping_add(i), byte);
+        }
+    }
+
+    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        let mut staging = vec![0; usize::from(len.saturating_sub(1)) * STRIDE + 1];
+        let base = NonNull::from(&mut staging[..]).cast();
+        // SAFETY: the staging bytes span the column, and nothing else reaches them meanwhile.
+        draw(unsafe { Column::new(base, len) });
+        for (row, &byte) in (0..len).zip(staging.iter().step_by(STRIDE)) {
+            self.store(at.wrapping_add(row * STRIDE as u16), byte);
+        }
+    }
+
+    fn purpose(&mut self, purpose: Purpose) {
+        self.purpose = purpose;
+    }
+}

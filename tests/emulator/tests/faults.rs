@@ -1,0 +1,226 @@
+//! Every fault, caused by an access that would blank, garble or be dropped on a card.
+
+use emulator::Vga;
+use modex::registers::*;
+use modex::{Bus, Destination, HEIGHT, ModeX, Purpose};
+
+const BLACK: [[u8; 3]; 256] = [[0; 3]; 256];
+
+/// A card in Mode X, its first frame begun.
+fn card() -> Vga {
+    let mut vga = Vga::new();
+    ModeX::set(&mut vga, &BLACK).unwrap();
+    vga.finish_frame();
+    assert_eq!(vga.take_faults(), []);
+    vga
+}
+
+fn word(index: u8, value: u8) -> u16 {
+    u16::from_le_bytes([index, value])
+}
+
+/// Runs `wrong` on a card in Mode X; it must cause the one fault, by that access.
+#[track_caller]
+fn faults(name: &str, access: &str, wrong: impl FnOnce(&mut Vga)) {
+    let mut vga = card();
+    wrong(&mut vga);
+    let faults = vga.take_faults();
+    let told: Vec<_> = faults.iter().map(|fault| fault.to_string()).collect();
+    assert_eq!(faults.len(), 1, "{told:?}");
+    assert_eq!(faults[0].name, name);
+    assert!(told[0].contains(access), "{told:?}");
+}
+
+#[test]
+fn registers_ports_and_values_that_no_scene_uses() {
+    let unused = "unused value";
+    faults(unused, "out 3C4h, 0204h", |v| {
+        v.out16(SEQUENCER, word(4, 0x02))
+    });
+    faults(unused, "out 3C4h, 0E04h", |v| {
+        v.out16(SEQUENCER, word(4, 0x0E))
+    });
+    faults(unused, "out 3C4h, 0002h", |v| {
+        v.out16(SEQUENCER, word(2, 0x00))
+    });
+    faults(unused, "SR3 = 01h", |v| v.out16(SEQUENCER, word(3, 0x01)));
+    faults("unused register", "SR6", |v| {
+        v.out16(SEQUENCER, word(6, 0x12))
+    });
+    faults(unused, "GR3 = 08h", |v| v.out16(GRAPHICS, word(3, 0x08)));
+    faults(unused, "GR5 = 01h", |v| v.out16(GRAPHICS, word(5, 0x01)));
+    faults(unused, "GR8 = F0h", |v| v.out16(GRAPHICS, word(8, 0xF0)));
+    faults("unused register", "GR9", |v| v.out16(GRAPHICS, word(9, 0)));
+    faults(unused, "CR13 = 50h", |v| v.out16(CRTC, word(0x13, 0x50)));
+    faults(unused, "CR17 = C3h", |v| v.out16(CRTC, word(0x17, 0xC3)));
+    faults("unused register", "CR19", |v| v.out16(CRTC, word(0x19, 0)));
+    faults(unused, "PEL Mask", |v| v.out8(PEL_MASK, 0x0F));
+    faults("unused port", "3C3", |v| v.out8(0x3C3, 1));
+    faults("unused port", "word write to 3C0", |v| {
+        v.out16(ATTRIBUTE, 0x2020)
+    });
+    faults("unused port", "000", |v| {
+        v.in8(0);
+    });
+    faults(unused, "DISPI", |v| v.out16(DISPI_DATA, 1));
+}
+
+#[test]
+fn what_a_card_drops_or_garbles() {
+    faults("write to a protected register", "CR00", |v| {
+        v.out16(CRTC, word(0, 0x5F))
+    });
+    faults("palette is closed", "AR0", |v| {
+        v.in8(INPUT_STATUS_1);
+        v.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE);
+        v.out8(ATTRIBUTE, 0);
+    });
+    faults("DAC value is wider than 6 bits", "40h", |v| {
+        v.out8(PEL_WRITE, 7);
+        v.out8(PEL_DATA, 0x40);
+    });
+    faults("address past the last page", "A000:E100", |v| {
+        v.purpose(Purpose::Draw);
+        v.column(0xE100, 1, |column| column.fill(|| 1));
+    });
+    faults("store to a page that is seen", "is on the screen", |v| {
+        v.purpose(Purpose::Draw);
+        v.column(0x4AFF, 1, |column| column.fill(|| 1));
+    });
+    faults(
+        "store to a page that is seen",
+        "will be on the screen",
+        |v| {
+            v.out16(CRTC, word(START_ADDRESS_HIGH, 0x4B));
+            v.purpose(Purpose::Erase);
+            v.column(0x4B00, 1, |column| column.fill(|| 1));
+        },
+    );
+    faults(
+        "start address is split over a retrace",
+        "out 3D4h, 500Dh",
+        |v| {
+            v.out16(CRTC, word(START_ADDRESS_HIGH, 0x4B));
+            v.finish_frame();
+            v.out16(CRTC, word(START_ADDRESS_LOW, 0x50));
+        },
+    );
+}
+
+#[test]
+fn what_a_fresh_card_does_not_take() {
+    let told = |wrong: &dyn Fn(&mut Vga)| -> Vec<&'static str> {
+        let mut vga = Vga::new();
+        wrong(&mut vga);
+        vga.take_faults()
+            .into_iter()
+            .map(|fault| fault.name)
+            .collect()
+    };
+    // The linear mode that the boot loader left.
+    assert_eq!(
+        told(&|v| v.out8(MISC_WRITE, 0xE3))[0],
+        "card is in a linear mode"
+    );
+    let leave = |v: &mut Vga| {
+        v.out16(DISPI_INDEX, DISPI_ENABLE);
+        v.out16(DISPI_DATA, 0);
+    };
+    let after = |wrong: &dyn Fn(&mut Vga)| {
+        told(&|v| {
+            leave(v);
+            wrong(v);
+        })
+    };
+    assert_eq!(
+        after(&|v| v.out8(MISC_WRITE, 0xE3)),
+        ["Miscellaneous Output changed without reset"]
+    );
+    assert_eq!(after(&|v| v.out8(ATTRIBUTE, 0)), ["flip-flop is unknown"]);
+    assert_eq!(after(&|v| v.out8(PEL_DATA, 0)), ["DAC entry is unknown"]);
+    // The BIOS leaves the protection on.
+    assert_eq!(
+        after(&|v| v.out16(CRTC, word(0, 0x5F))),
+        ["write to a protected register"]
+    );
+    assert_eq!(
+        after(&|v| {
+            v.in8(MISC_READ);
+        }),
+        ["read of a register never written"]
+    );
+    assert_eq!(after(&|v| v.store64(0, 0))[0], "memory is not unchained");
+}
+
+#[test]
+fn what_the_monitor_would_not_show() {
+    let shown = |wrong: &dyn Fn(&mut Vga)| {
+        let mut vga = card();
+        wrong(&mut vga);
+        vga.take_faults();
+        vga.scan_out().map_err(|fault| fault.name).err()
+    };
+    assert_eq!(shown(&|_| ()), None);
+    assert_eq!(
+        shown(&|v| v.out16(SEQUENCER, word(RESET, 0x01))),
+        Some("sequencer is in reset")
+    );
+    assert_eq!(
+        shown(&|v| v.out16(SEQUENCER, word(CLOCKING_MODE, 0x21))),
+        Some("screen is off")
+    );
+    assert_eq!(
+        shown(&|v| v.out16(SEQUENCER, word(4, 0x0E))),
+        Some("memory is not unchained")
+    );
+    assert_eq!(
+        shown(&|v| {
+            v.in8(INPUT_STATUS_1);
+            v.out8(ATTRIBUTE, 0x10);
+        }),
+        Some("PAS is 0")
+    );
+    assert_eq!(
+        shown(&|v| v.out16(GRAPHICS, word(6, 0x04))),
+        Some("AR10 and GR6 disagree about graphics")
+    );
+    let mut vga = Vga::new();
+    ModeX::set(&mut vga, &BLACK).unwrap();
+    assert_eq!(vga.scan_out().unwrap_err().name, "no frame was begun");
+}
+
+#[test]
+fn a_start_address_is_shown_from_the_next_retrace_on() {
+    let mut vga = Vga::new();
+    let mut palette = BLACK;
+    palette[1] = [63, 0, 0];
+    let mut card = ModeX::set(&mut vga, &palette).unwrap();
+    card.bus().finish_frame();
+    let red = [1; HEIGHT];
+    card.begin(&red).column(0, 0, 1, |column| column.fill(|| 0));
+    card.flip();
+    let colour = |vga: &Vga| vga.scan_out().unwrap().dots[2 * 640 + 10];
+    assert_eq!(colour(card.bus()), [0, 0, 0]);
+    card.settle();
+    assert_eq!(colour(card.bus()), [63, 0, 0]);
+}
+
+#[test]
+fn a_load_fills_the_latches_and_a_peek_does_not() {
+    let mut vga = card();
+    for plane in 0..4 {
+        vga.out16(SEQUENCER, word(MAP_MASK, 1 << plane));
+        vga.column(0x5000, 1, |column| column.fill(|| 10 + plane));
+    }
+    for plane in 0..4 {
+        vga.out16(GRAPHICS, word(4, plane));
+        assert_eq!(vga.load(0x5000), 10 + plane);
+        assert_eq!(vga.peek(usize::from(plane), 0x5000), 10 + plane);
+    }
+}
+
+#[test]
+#[should_panic(expected = "unused port")]
+fn a_fault_that_nobody_took_fails_the_test() {
+    card().out8(0x3C3, 1);
+}
