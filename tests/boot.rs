@@ -5,7 +5,8 @@
 
 use std::collections::HashSet;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Write};
+use std::os::unix::net::UnixStream;
 use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command as Process, Output, Stdio};
@@ -355,6 +356,31 @@ fn a_hang_is_noticed() {
     let failure = failure(Fault::Hang);
     let waited_for = "the answer to 'fail hang'".into();
     assert_eq!(failure.verdict, Verdict::Hang { waited_for });
+}
+
+#[test]
+fn a_paused_machine_does_not_hang() {
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("monitor");
+    let mut config = config();
+    let monitor = format!("unix:{},server=on,wait=off", socket.display());
+    config.arguments = vec!["-monitor".into(), monitor.into()];
+    let mut machine = Machine::boot(&config).unwrap();
+    let mut monitor = UnixStream::connect(&socket).unwrap();
+    monitor.write_all(b"stop\n").unwrap();
+    machine.rest(Duration::from_secs(1)).unwrap();
+    // Longer than an answer may take.
+    let resume = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs(22));
+        monitor.write_all(b"cont\n").unwrap();
+        monitor
+    });
+    machine.ask(Command::Hold).unwrap();
+    assert!(
+        resume.is_finished(),
+        "the answer came while the machine stood still"
+    );
+    machine.leave().unwrap();
 }
 
 #[test]
