@@ -7,8 +7,8 @@
 //! `cargo test --test setup -- --ignored real`.
 
 use std::env;
-use std::fs;
-use std::io::Write;
+use std::fs::{self, File};
+use std::io::{Read, Write};
 use std::os::unix::fs::symlink;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 
 use crystal_ball::child::{self, Interrupted};
 use crystal_ball::setup::{self, Options};
+use rustix::fs::{Mode, OFlags};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use tempfile::TempDir;
 
 /// Names what the process of [`in_a_world`] shall do.
@@ -135,6 +137,8 @@ impl World {
         command.args(["--exact", "in_a_world", "--ignored", "--nocapture"]);
         if !self.real {
             command.env_clear().env("HOME", self.path("home"));
+            // Not below the user's home, where cargo's settings may be.
+            command.current_dir(self.path("home"));
             command
                 .env("PATH", self.path("bin"))
                 .env("CARGO", self.path("bin/cargo"));
@@ -383,8 +387,16 @@ fn nothing_is_fetched_when_cargo_is_offline() {
         .env("CARGO_NET_OFFLINE", "true")
         .output()
         .unwrap();
-    Said::from(offline).badly(&["offline"]);
+    Said::from(offline).badly(&["offline (CARGO_NET_OFFLINE)"]);
+    let settings = world.path("home/.cargo");
+    fs::create_dir(&settings).unwrap();
+    fs::write(settings.join("config.toml"), "[net]\noffline = true\n").unwrap();
+    world.does("image").badly(&["offline (net.offline in "]);
+    world
+        .does("doctor")
+        .badly(&["not used (net.offline in ", ".cargo/config.toml)"]);
     assert!(!world.path("home/rustup.log").exists());
+    fs::remove_dir_all(settings).unwrap();
     world.does("image").well();
     let offline = world
         .command("image")
@@ -639,6 +651,39 @@ fn missing_qemu_is_installed_in_the_open_or_asked_for() {
 }
 
 #[test]
+fn question_is_ended_by_the_first_interrupt() {
+    let world = World::new();
+    world.remove("qemu-system-x86_64");
+    for program in ["apt-get", "sudo"] {
+        world.program(program, "exit 1");
+    }
+    let user = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
+    grantpt(&user).unwrap();
+    unlockpt(&user).unwrap();
+    let terminal = ptsname(&user, Vec::new()).unwrap();
+    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
+    let terminal = rustix::fs::open(terminal, flags, Mode::empty()).unwrap();
+    let mut child = world
+        .command("ready")
+        .stdin(terminal.try_clone().unwrap())
+        .stderr(terminal)
+        .spawn()
+        .unwrap();
+    let mut user = File::from(user);
+    let mut text = Vec::new();
+    while !text.ends_with(b"[y/N]\r\n") {
+        let mut byte = [0];
+        user.read_exact(&mut byte).unwrap();
+        text.extend(byte);
+    }
+    // By now it waits for the answer, or will within a moment: either must do.
+    signal(&child, "INT");
+    wait_for(|| child.try_wait().unwrap().is_some());
+    let ended = child.wait().unwrap();
+    assert_eq!(ended.code(), Some(Interrupted::EXIT_CODE));
+}
+
+#[test]
 fn being_without_a_window_is_no_error() {
     let world = World::new();
     world.program("qemu-system-x86_64", &QEMU.replace("gtk", "curses"));
@@ -743,7 +788,7 @@ fn signal(child: &Child, name: &str) {
 }
 
 #[track_caller]
-fn wait_for(condition: impl Fn() -> bool) {
+fn wait_for(mut condition: impl FnMut() -> bool) {
     let begun = Instant::now();
     while !condition() {
         assert!(begun.elapsed() < Duration::from_secs(20), "waited too long");

@@ -189,7 +189,7 @@ fn read_lines(
     })
 }
 
-/// The command line as the user would type it, without what ties it to this program.
+/// The command line as the user would type it into a shell, without what ties it to this program.
 pub fn line(command: &Command) -> String {
     let own = [command.get_program()]
         .into_iter()
@@ -200,9 +200,19 @@ pub fn line(command: &Command) -> String {
         .is_some_and(|first| first == "--pdeathsig");
     let words = own.skip(if tied { 1 + TIED_ARGUMENTS } else { 0 });
     words
-        .map(|word| word.to_string_lossy())
+        .map(|word| quoted(&word.to_string_lossy()))
         .collect::<Vec<_>>()
         .join(" ")
+}
+
+/// A word for the shell.
+fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "_@%+=:,./-".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    }
 }
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
@@ -277,7 +287,7 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(
-            error.starts_with("`sh -c seq 1 50 >&2; exit 3` failed (exit status: 3)\n31\n"),
+            error.starts_with("`sh -c 'seq 1 50 >&2; exit 3'` failed (exit status: 3)\n31\n"),
             "{error}"
         );
         assert!(error.ends_with("\n50"), "{error}");
@@ -285,6 +295,29 @@ mod tests {
             .unwrap_err()
             .to_string();
         assert!(error.contains("/no/such/program"), "{error}");
+    }
+
+    #[test]
+    fn line_is_what_a_shell_reads_as_the_same_words() {
+        let words = [
+            "-name",
+            "Crystal Ball",
+            "",
+            "it's",
+            "a$b`c`\"d\"",
+            "\n",
+            "id=x,a@b%c+:./_",
+            "ä",
+        ];
+        for mut printf in [command("printf"), family("printf")] {
+            let line = line(printf.arg(r"%s\0").args(words));
+            assert!(
+                line.starts_with(r"printf '%s\0' -name 'Crystal Ball' '' 'it'\''s' "),
+                "{line}"
+            );
+            let read = run(command("sh").args(["-c", &line])).unwrap();
+            assert_eq!(read, words.map(|word| format!("{word}\0")).concat());
+        }
     }
 
     #[test]

@@ -1,18 +1,17 @@
 //! The `crystal-ball` command.
 
 use std::ffi::OsString;
-use std::fs::{File, Permissions};
+use std::fs::File;
 use std::io::{self, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
-use crystal_ball::child;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
-use crystal_ball::setup::{self, Options, Ready};
+use crystal_ball::setup::{self, Options, Ready, say};
+use crystal_ball::{aside, child};
 
 /// How long the ball turns before its picture is taken without a display.
 const WARM_UP: Duration = Duration::from_secs(1);
@@ -102,10 +101,36 @@ fn main() -> ExitCode {
             } else {
                 1
             };
-            // With standard error closed there is nobody to tell.
-            let _ = writeln!(io::stderr(), "{message}");
+            say(message);
             ExitCode::from(code)
         }
+    }
+}
+
+/// Standard output, which may be closed: what nobody reads is no error, what a full disk loses is.
+struct Output;
+
+impl Output {
+    fn attempt<T>(unread: T, result: io::Result<T>) -> io::Result<T> {
+        result.or_else(|error| match error.kind() {
+            io::ErrorKind::BrokenPipe => Ok(unread),
+            // To be written again.
+            io::ErrorKind::Interrupted => Err(error),
+            kind => {
+                let message = format!("standard output cannot be written: {error}");
+                Err(io::Error::new(kind, message))
+            }
+        })
+    }
+}
+
+impl Write for Output {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        Self::attempt(bytes.len(), io::stdout().write(bytes))
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Self::attempt((), io::stdout().flush())
     }
 }
 
@@ -118,7 +143,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
     match cli.command {
         Some(Subcommands::Doctor) => {
             options.window = has_display();
-            let whole = setup::doctor(&options, &mut io::stdout().lock())?;
+            let whole = setup::doctor(&options, &mut Output)?;
             return Ok(if whole {
                 ExitCode::SUCCESS
             } else {
@@ -126,7 +151,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             });
         }
         Some(Subcommands::Clean) => {
-            setup::clean(&mut io::stdout().lock())?;
+            setup::clean(&mut Output)?;
         }
         Some(Subcommands::Image { out }) => write_image(&setup::image(&options)?, &out)?,
         None => {
@@ -158,10 +183,10 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
         } else {
             "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)"
         };
-        eprintln!("{why}: booting without a window");
+        say(format_args!("{why}: booting without a window"));
     }
     let start = Instant::now();
-    eprintln!("booting in QEMU {}", ready.qemu.version);
+    say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
         qemu: ready.qemu.path.clone(),
         image: ready.image.clone(),
@@ -172,46 +197,29 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
     })?;
     machine.wait_until_running()?;
     let seconds = start.elapsed().as_secs_f64();
-    eprintln!("the first picture is on the screen after {seconds:.1} s");
+    say(format_args!(
+        "the first picture is on the screen after {seconds:.1} s"
+    ));
     if window.is_some() {
-        eprintln!("close the window or type Ctrl-C to end it");
+        say("close the window or type Ctrl-C to end it");
         return machine.watch();
     }
     machine.rest(WARM_UP)?;
     let picture = folder.join("picture.png");
     let screen = machine.screendump()?;
-    write_aside(&picture, |file| screen.write_png(file))?;
+    aside::write(&picture, |file| screen.write_png(file))?;
     machine.leave()?;
-    eprintln!("a picture of the running ball:");
-    println!("{}", picture.display());
+    say("a picture of the running ball:");
+    writeln!(Output, "{}", picture.display())?;
     Ok(())
 }
 
 fn write_image(image: &Path, out: &Path) -> anyhow::Result<()> {
     let mut from = File::open(image).with_context(|| format!("{} is gone", image.display()))?;
-    let bytes = write_aside(out, |file| Ok(io::copy(&mut from, file)?))?;
-    eprintln!(
+    let bytes = aside::write(out, |file| Ok(io::copy(&mut from, file)?))?;
+    say(format_args!(
         "{}: {bytes} bytes; boots on a PC BIOS with a VGA",
         out.display()
-    );
+    ));
     Ok(())
-}
-
-/// Writes a file beside its place and renames it: it is whole or not there.
-fn write_aside<T>(
-    path: &Path,
-    write: impl FnOnce(&mut File) -> anyhow::Result<T>,
-) -> anyhow::Result<T> {
-    let folder = match path.parent() {
-        Some(folder) if folder != Path::new("") => folder,
-        _ => Path::new("."),
-    };
-    let context = || format!("{} cannot be written", path.display());
-    let mut file = tempfile::Builder::new()
-        .permissions(Permissions::from_mode(0o666))
-        .tempfile_in(folder)
-        .with_context(context)?;
-    let written = write(file.as_file_mut()).with_context(context)?;
-    file.persist(path).with_context(context)?;
-    Ok(written)
 }

@@ -23,6 +23,7 @@ mod rustup;
 mod toolchain;
 
 use cache::Cache;
+pub use progress::say;
 pub use qemu::Qemu;
 
 /// What the user may decide about the set-up.

@@ -189,8 +189,8 @@ fn packages(cache: &Locked) -> anyhow::Result<Vec<PathBuf>> {
     let list = if whole {
         list
     } else {
-        if offline() {
-            bail!("cargo is offline (CARGO_NET_OFFLINE), so nothing is downloaded");
+        if let Some(setting) = offline() {
+            bail!("cargo is offline ({setting}), so nothing is downloaded");
         }
         fetch(cache, &names, &folder)?
     };

@@ -92,12 +92,9 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     }
     also(
         "network",
-        if toolchain::offline() {
-            "not used (CARGO_NET_OFFLINE)"
-        } else {
-            "may be used"
-        }
-        .to_owned(),
+        toolchain::offline().map_or("may be used".to_owned(), |setting| {
+            format!("not used ({setting})")
+        }),
     )?;
     Ok(lines.iter().all(|(_, line)| line.is_ok()))
 }

@@ -14,7 +14,7 @@ use crate::child::Event;
 /// Without a terminal: this long without a word is long enough.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// One line.
+/// One line for the user, on standard error; lost where that is closed.
 pub fn say(text: impl Display) {
     // There is no other place to report that standard error is closed.
     let _ = writeln!(stderr().lock(), "{text}");

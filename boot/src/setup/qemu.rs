@@ -11,6 +11,8 @@ use std::path::PathBuf;
 use std::process::Command;
 
 use anyhow::{Context, bail};
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
 
 use super::Options;
 use super::progress::say;
@@ -20,6 +22,12 @@ use crate::child::{self, Interrupted, interrupted};
 const PROGRAM: &str = "qemu-system-x86_64";
 const PACKAGE: &str = "qemu-system-x86";
 const WINDOW_PACKAGE: &str = "qemu-system-gui";
+
+/// How long Ctrl-C may go unheard at a question.
+const STEP: Timespec = Timespec {
+    tv_sec: 0,
+    tv_nsec: 50_000_000,
+};
 
 /// A QEMU that starts.
 #[derive(Debug, Clone)]
@@ -146,19 +154,14 @@ fn install(package: &str, why: &str) -> anyhow::Result<()> {
         "{0}apt-get update && {0}apt-get install --no-install-recommends {package}",
         if root { "" } else { "sudo " }
     );
-    if offline() || right == Right::None {
+    if offline().is_some() || right == Right::None {
         bail!("{why}; install it with\n  {by_hand}");
     }
     if let Right::Ask { .. } = right {
         say(format_args!(
             "{why}. Install it on this system, with\n  {by_hand}\nnow? [y/N]"
         ));
-        let mut answer = String::new();
-        stdin().read_line(&mut answer)?;
-        if interrupted() {
-            return Err(Interrupted.into());
-        }
-        if !matches!(answer.trim().to_lowercase().as_str(), "y" | "yes") {
+        if !matches!(answer()?.trim().to_lowercase().as_str(), "y" | "yes") {
             bail!("{why}; when you want it:\n  {by_hand}");
         }
     } else {
@@ -198,6 +201,30 @@ fn install(package: &str, why: &str) -> anyhow::Result<()> {
         }
     }
     Ok(())
+}
+
+/// A line from the terminal.
+fn answer() -> anyhow::Result<String> {
+    let input = stdin();
+    // `read_line` alone goes on after a signal, and the user would have to type Ctrl-C twice.
+    loop {
+        if interrupted() {
+            return Err(Interrupted.into());
+        }
+        match poll(&mut [PollFd::new(&input, PollFlags::IN)], Some(&STEP)) {
+            Ok(0) | Err(Errno::INTR) => {}
+            Ok(_) => break,
+            Err(error) => return Err(error).context("the terminal cannot be read"),
+        }
+    }
+    let mut answer = String::new();
+    let read = input.read_line(&mut answer);
+    // The terminal was closed: that is a signal and an error.
+    if interrupted() {
+        return Err(Interrupted.into());
+    }
+    read.context("the terminal cannot be read")?;
+    Ok(answer)
 }
 
 #[cfg(test)]

@@ -28,8 +28,8 @@ pub fn installed() -> Option<Toolchain> {
 
 /// Downloads the pinned toolchain into the cache.
 pub fn download(cache: &Locked) -> anyhow::Result<Toolchain> {
-    if offline() {
-        bail!("cargo is offline (CARGO_NET_OFFLINE), so nothing is downloaded");
+    if let Some(setting) = offline() {
+        bail!("cargo is offline ({setting}), so nothing is downloaded");
     }
     let rustup = which::which("rustup")
         .ok()

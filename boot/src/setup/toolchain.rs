@@ -4,9 +4,11 @@
 //! with which the boot loader's build makes flat binaries. Plain stable toolchains have the first only.
 
 use std::env;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
+use toml::de::DeTable;
 
 use super::cache::{Cache, Locked};
 use super::progress::say;
@@ -15,6 +17,9 @@ use crate::child::{self, Interrupted};
 
 /// Names a complete toolchain in the environment.
 pub const VARIABLE: &str = "CRYSTAL_BALL_TOOLCHAIN";
+
+/// The environment's name of cargo's setting `net.offline`.
+const OFFLINE: &str = "CARGO_NET_OFFLINE";
 
 /// A complete toolchain.
 #[derive(Debug)]
@@ -168,14 +173,77 @@ fn indented(error: &anyhow::Error) -> String {
     format!("{error:#}").replace('\n', "\n    ")
 }
 
-/// Cargo's word that the network must not be used.
-pub fn offline() -> bool {
-    env::var("CARGO_NET_OFFLINE").is_ok_and(|value| matches!(value.as_str(), "true" | "1"))
+/// Cargo's word that the network must not be used: the setting that says so.
+pub fn offline() -> Option<String> {
+    let folder = env::current_dir().unwrap_or_default();
+    let home = env::var_os("CARGO_HOME")
+        .filter(|home| !home.is_empty())
+        .map(PathBuf::from)
+        .or_else(|| Some(env::home_dir()?.join(".cargo")));
+    offline_by(env::var(OFFLINE).ok().as_deref(), &folder, home.as_deref())
+}
+
+/// By cargo's rules: the variable, then the files from the current folder upward, then cargo's home.
+fn offline_by(variable: Option<&str>, folder: &Path, home: Option<&Path>) -> Option<String> {
+    if let Some(value) = variable {
+        return matches!(value, "true" | "1").then(|| OFFLINE.to_owned());
+    }
+    let folders = folder.ancestors().map(|folder| folder.join(".cargo"));
+    // Of two in one folder cargo reads the one with the old name.
+    let mut files = folders
+        .chain(home.map(Path::to_owned))
+        .filter_map(|folder| {
+            let names = ["config", "config.toml"].map(|name| folder.join(name));
+            names.into_iter().find(|file| file.exists())
+        });
+    let (says, file) = files.find_map(|file| Some((net_offline(&file)?, file)))?;
+    says.then(|| format!("net.offline in {}", file.display()))
+}
+
+/// What a configuration file says; a broken one says nothing here, as cargo itself complains about it.
+fn net_offline(file: &Path) -> Option<bool> {
+    let text = fs::read_to_string(file).ok()?;
+    let table = DeTable::parse(&text).ok()?;
+    let net = table.get_ref().get("net")?.get_ref();
+    net.get("offline")?.get_ref().as_bool()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn offline_is_what_cargo_says_in_its_order() {
+        let place = tempfile::tempdir().unwrap();
+        let at = |name: &str| place.path().join(name);
+        let (folder, home) = (at("up/down"), at("home"));
+        for folder in ["up/.cargo", "up/down/.cargo", "home"] {
+            fs::create_dir_all(at(folder)).unwrap();
+        }
+        let by = |variable| offline_by(variable, &folder, Some(&home));
+        let file = |name: &str| Some(format!("net.offline in {}", at(name).display()));
+        assert_eq!(by(None), None);
+        for said in ["true", "1"] {
+            assert_eq!(by(Some(said)).as_deref(), Some(OFFLINE));
+        }
+        fs::write(at("home/config.toml"), "[net]\noffline = true").unwrap();
+        assert_eq!(by(None), file("home/config.toml"));
+        assert_eq!(by(Some("false")), None);
+        assert_eq!(offline_by(None, &folder, None), None);
+        // A nearer file that says nothing of it, or is broken, changes nothing.
+        for nothing in ["net.retry = 3", "[net", "net = 1", "net.offline = 1"] {
+            fs::write(at("up/.cargo/config.toml"), nothing).unwrap();
+            assert_eq!(by(None), file("home/config.toml"), "{nothing}");
+        }
+        fs::write(at("up/.cargo/config.toml"), "net.offline = false").unwrap();
+        assert_eq!(by(None), None);
+        fs::write(at("up/down/.cargo/config.toml"), "net = { offline = true }").unwrap();
+        assert_eq!(by(None), file("up/down/.cargo/config.toml"));
+        fs::write(at("up/down/.cargo/config"), "").unwrap();
+        assert_eq!(by(None), None);
+        fs::write(at("up/.cargo/config"), "net.offline = true").unwrap();
+        assert_eq!(by(None), file("up/.cargo/config"));
+    }
 
     #[test]
     fn reason_is_the_programs_own_error() {
