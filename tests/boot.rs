@@ -228,22 +228,32 @@ fn map_mask_is_written_once_for_each_column() {
 fn the_running_show_paces_itself_and_can_be_held() {
     let mut machine = boot();
     machine.wait_until_running().unwrap();
-    let pictures = |machine: &mut Machine| -> Option<u32> {
+    let pace = |machine: &mut Machine| -> Option<[u32; 2]> {
         let counts = machine.ask(Command::Counts).unwrap();
         let pace = counts.iter().find(|line| line.starts_with("pace "))?;
-        Some(pace.split(' ').nth(2).unwrap().parse().unwrap())
+        let words: Vec<_> = pace.split(' ').collect();
+        Some([words[2], words[6]].map(|number| number.parse().unwrap()))
     };
-    let (before, since) = (pictures(&mut machine).unwrap(), Instant::now());
-    machine.rest(Duration::from_secs(2)).unwrap();
-    let shown = pictures(&mut machine).unwrap() - before;
-    let most = since.elapsed().as_millis() as u32 * 61 / 1000 + 2;
-    // At most one picture a tick, and on the slowest machine some.
-    assert!(
-        (1..=most).contains(&shown),
-        "{shown} pictures, at most {most}"
-    );
+    // A busy host may take the machine's time away, so that ticks are lost: of some seconds one
+    // must have nearly all of its sixty. It never gives more.
+    let seconds = (0..20).map(|_| {
+        let since = Instant::now();
+        let [pictures, ticks] = pace(&mut machine).unwrap();
+        machine.rest(Duration::from_secs(1)).unwrap();
+        let [pictures_then, ticks_then] = pace(&mut machine).unwrap();
+        let (shown, ticked) = (pictures_then - pictures, ticks_then - ticks);
+        let most = since.elapsed().as_millis() as u32 * 61 / 1000 + 3;
+        assert!(ticked <= most, "{ticked} ticks in {:?}", since.elapsed());
+        assert!(shown <= ticked + 1, "{shown} pictures in {ticked} ticks");
+        (ticked, shown)
+    });
+    let paced = seconds
+        .into_iter()
+        .any(|(ticked, shown)| ticked >= 55 && shown >= 30);
+    assert!(paced, "no second of twenty had its ticks and pictures");
+
     machine.ask(Command::Hold).unwrap();
-    assert_eq!(pictures(&mut machine), None);
+    assert_eq!(pace(&mut machine), None);
     let still = machine.screendump().unwrap();
     machine.rest(Duration::from_millis(300)).unwrap();
     assert!(
@@ -287,27 +297,34 @@ fn noise_on_the_line_is_answered_and_survived() {
     machine.leave().unwrap();
 }
 
-/// Asks the kernel to break, and returns how that was judged.
-fn failure(fault: Fault) -> Failure {
-    let mut machine = boot();
-    let failure = verdict(machine.ask(Command::Fail(fault)));
-    let evidence = failure.evidence.as_deref().expect("evidence is kept");
-    for name in ["command.txt", "serial.log", "screen.png"] {
-        assert!(
-            evidence.join(name).exists(),
-            "{name} is missing in {}",
-            evidence.display()
-        );
+/// A failure whose evidence goes when the test has ended well, and stays when it has not.
+struct Judged(Failure);
+
+impl Drop for Judged {
+    fn drop(&mut self) {
+        if let (Some(folder), false) = (&self.0.evidence, std::thread::panicking()) {
+            std::fs::remove_dir_all(folder).unwrap();
+        }
     }
-    std::fs::remove_dir_all(evidence).unwrap();
-    failure
+}
+
+/// Asks the kernel to break, and returns how that was judged.
+fn failure(fault: Fault) -> Judged {
+    let mut machine = boot();
+    let judged = Judged(verdict(machine.ask(Command::Fail(fault))));
+    let evidence = judged.0.evidence.as_deref().expect("evidence is kept");
+    for name in ["command.txt", "serial.log", "screen.png"] {
+        let there = evidence.join(name).exists();
+        assert!(there, "{name} is missing in {}", evidence.display());
+    }
+    judged
 }
 
 #[test]
 fn a_panic_is_told_with_its_place() {
-    let failure = failure(Fault::Panic);
-    let Verdict::Panic { report } = &failure.verdict else {
-        panic!("{failure}");
+    let judged = failure(Fault::Panic);
+    let Verdict::Panic { report } = &judged.0.verdict else {
+        panic!("{}", judged.0);
     };
     assert!(
         report[0].starts_with("panic at kernel/src/machine.rs:"),
@@ -316,11 +333,51 @@ fn a_panic_is_told_with_its_place() {
     assert_eq!(report[1], "asked to, by 'fail panic'");
 }
 
+/// The line is locked and half written: the report goes past both.
+#[test]
+fn a_panic_in_the_middle_of_a_line_is_told_whole() {
+    let judged = failure(Fault::PanicInLine);
+    let Verdict::Panic { report } = &judged.0.verdict else {
+        panic!("{}", judged.0);
+    };
+    assert_eq!(report[1], "asked to, by 'fail panic-in-line'");
+}
+
+/// The kernel ends while more was asked: its last words are still read.
+#[test]
+fn a_panic_with_commands_under_way_is_told_whole() {
+    let mut machine = boot();
+    machine.send_raw(b"fail panic\ncounts\ncounts\n").unwrap();
+    let judged = Judged(verdict(machine.wait_for_end()));
+    let Verdict::Panic { report } = &judged.0.verdict else {
+        panic!("{}", judged.0);
+    };
+    assert_eq!(report[1], "asked to, by 'fail panic'");
+    assert!(
+        judged
+            .0
+            .evidence
+            .as_ref()
+            .unwrap()
+            .join("screen.png")
+            .exists()
+    );
+}
+
+#[test]
+fn a_reboot_loop_is_noticed() {
+    let mut config = config();
+    config.arguments = vec!["-action".into(), "reboot=reset".into()];
+    let mut machine = Machine::boot(&config).unwrap();
+    let judged = Judged(verdict(machine.ask(Command::Fail(Fault::TripleFault))));
+    assert_eq!(judged.0.verdict, Verdict::TripleFault { booted: true });
+}
+
 #[test]
 fn an_exception_is_told_with_its_registers() {
-    let failure = failure(Fault::PageFault);
-    let Verdict::Exception { report } = &failure.verdict else {
-        panic!("{failure}");
+    let judged = failure(Fault::PageFault);
+    let Verdict::Exception { report } = &judged.0.verdict else {
+        panic!("{}", judged.0);
     };
     assert_eq!(report[0], "exception page fault (vector 14)");
     assert!(report[1].ends_with("cr2 0000000000000040"), "{report:?}");
@@ -335,9 +392,9 @@ fn an_exception_is_told_with_its_registers() {
 
 #[test]
 fn a_stack_overflow_has_its_name() {
-    let failure = failure(Fault::StackOverflow);
-    let Verdict::Exception { report } = &failure.verdict else {
-        panic!("{failure}");
+    let judged = failure(Fault::StackOverflow);
+    let Verdict::Exception { report } = &judged.0.verdict else {
+        panic!("{}", judged.0);
     };
     assert!(
         report[0].starts_with("exception stack overflow"),
@@ -347,31 +404,44 @@ fn a_stack_overflow_has_its_name() {
 
 #[test]
 fn a_triple_fault_is_no_success() {
-    let failure = failure(Fault::TripleFault);
-    assert_eq!(failure.verdict, Verdict::TripleFault { booted: false });
+    let judged = failure(Fault::TripleFault);
+    assert_eq!(judged.0.verdict, Verdict::TripleFault { booted: false });
 }
 
 #[test]
 fn a_hang_is_noticed() {
-    let failure = failure(Fault::Hang);
+    let judged = failure(Fault::Hang);
     let waited_for = "the answer to 'fail hang'".into();
-    assert_eq!(failure.verdict, Verdict::Hang { waited_for });
+    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }
 
-#[test]
-fn a_paused_machine_does_not_hang() {
+/// A machine, and QEMU's monitor, by which the test does what a user does at the window.
+fn boot_with_monitor() -> (Machine, UnixStream) {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("monitor");
     let mut config = config();
     let monitor = format!("unix:{},server=on,wait=off", socket.display());
     config.arguments = vec!["-monitor".into(), monitor.into()];
-    let mut machine = Machine::boot(&config).unwrap();
-    let mut monitor = UnixStream::connect(&socket).unwrap();
+    let machine = Machine::boot(&config).unwrap();
+    (machine, UnixStream::connect(&socket).unwrap())
+}
+
+/// What GTK's window does when it is closed.
+#[test]
+fn a_closed_window_is_the_users_doing() {
+    let (machine, mut monitor) = boot_with_monitor();
+    monitor.write_all(b"quit\n").unwrap();
+    assert_eq!(verdict(machine.watch()).verdict, Verdict::User);
+}
+
+#[test]
+fn a_paused_machine_does_not_hang() {
+    let (mut machine, mut monitor) = boot_with_monitor();
     monitor.write_all(b"stop\n").unwrap();
     machine.rest(Duration::from_secs(1)).unwrap();
     // Longer than an answer may take.
     let resume = std::thread::spawn(move || {
-        std::thread::sleep(Duration::from_secs(22));
+        std::thread::sleep(Duration::from_secs(16));
         monitor.write_all(b"cont\n").unwrap();
         monitor
     });
@@ -467,13 +537,16 @@ fn without_a_display_a_picture_is_left() {
         (info.width, info.height, info.line_size),
         (640, 480, 3 * 640)
     );
-    // The sky at the left edge, where the ball never is: the mode, the palette and the page are
-    // right whatever the tick was.
-    let (expected, _) = &emulate(&[0])[0];
-    for y in 0..480 {
-        let shown = &bytes[y * info.line_size..][..3];
-        assert_eq!(shown, expected.pixels[y * expected.width], "line {y}");
-    }
+    // It is the picture of some tick of the first minute, from edge to edge.
+    let expected = (0..60).flat_map(|second| {
+        let frames: Vec<_> = (second * 60..(second + 1) * 60).collect();
+        emulate(&frames)
+    });
+    let mut expected = expected.map(|(picture, _)| picture);
+    assert!(
+        expected.any(|picture| picture.pixels.as_flattened() == bytes),
+        "the picture is none of the show's"
+    );
 }
 
 #[test]

@@ -12,6 +12,7 @@
 //! a last screendump can be taken. Threads only read (serial, QMP, QEMU's words, its end) and
 //! feed one channel; everything is decided on the caller's thread.
 
+mod patience;
 mod qmp;
 mod verdict;
 
@@ -29,20 +30,20 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
 use link::{Command, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, Lines, OK, PANIC, RUNNING};
-use rustix::process::{Pid, Signal, kill_process, test_kill_process};
+use rustix::process::{Pid, Signal, kill_process_group, test_kill_process};
 use serde_json::{Value, json};
 use tempfile::TempDir;
 
+use patience::Patience;
 pub use verdict::{Failure, Verdict};
 
 use crate::child;
 use crate::screen::Screen;
 
-/// From starting QEMU to the kernel's first line. Alone it takes 2 s; beside other work on two
-/// cores it was seen to take more than 30.
-const BOOT_LIMIT: Duration = Duration::from_secs(60);
+/// From starting QEMU to the kernel's first line: ten times the 2 s that it takes alone.
+const BOOT_LIMIT: Duration = Duration::from_secs(20);
 /// For an answer of the kernel or of QEMU. Alone the slowest takes a tick and a picture.
-const ANSWER_LIMIT: Duration = Duration::from_secs(20);
+const ANSWER_LIMIT: Duration = Duration::from_secs(10);
 /// How often a running show is asked for a sign of life.
 const HEARTBEAT: Duration = Duration::from_secs(5);
 /// How often waiting looks up, for Ctrl-C.
@@ -97,6 +98,8 @@ struct Seen {
     words: Vec<String>,
     /// QEMU's end.
     ended: Option<ExitStatus>,
+    /// Everything that the kernel said has been read.
+    serial_closed: bool,
 }
 
 enum Event {
@@ -105,6 +108,7 @@ enum Event {
     Control(Value),
     Words(String),
     Ended(std::io::Result<ExitStatus>),
+    SerialClosed,
 }
 
 impl Machine {
@@ -113,6 +117,13 @@ impl Machine {
     /// # Errors
     /// A [`Failure`] with the verdict, or why QEMU could not be started at all.
     pub fn boot(config: &Config) -> anyhow::Result<Self> {
+        if config
+            .arguments
+            .iter()
+            .any(|argument| argument == "-daemonize")
+        {
+            bail!("QEMU must stay this program's child, or nothing could end it: no -daemonize");
+        }
         let folder = tempfile::Builder::new()
             .prefix("crystal-ball-")
             .tempdir()
@@ -146,9 +157,9 @@ impl Machine {
             answers: VecDeque::new(),
         };
         machine.negotiate()?;
-        let by = Instant::now() + BOOT_LIMIT;
+        let mut patience = Patience::new(process, BOOT_LIMIT);
         while !machine.seen.hello {
-            if !machine.pump(by)? {
+            if !machine.pump_or_wait(&mut patience)? {
                 return Err(machine.fail(Verdict::BootLoader { reset: false }));
             }
         }
@@ -165,9 +176,9 @@ impl Machine {
     /// # Errors
     /// A [`Failure`].
     pub fn wait_until_running(&mut self) -> anyhow::Result<()> {
-        let by = Instant::now() + ANSWER_LIMIT;
+        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
         while self.lines.pop_front().is_none_or(|line| line != RUNNING) {
-            if self.lines.is_empty() && !self.pump(by)? {
+            if self.lines.is_empty() && !self.pump_or_wait(&mut patience)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: "the first picture".into(),
                 }));
@@ -230,7 +241,7 @@ impl Machine {
     /// A [`Failure`]; a hang if no answer comes in time. No time passes while the user has paused
     /// the machine, as QEMU's window can.
     pub fn answer(&mut self, asked: &str) -> anyhow::Result<Vec<String>> {
-        let mut by = Instant::now() + ANSWER_LIMIT;
+        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
         let mut answer = Vec::new();
         loop {
             while let Some(line) = self.lines.pop_front() {
@@ -243,11 +254,11 @@ impl Machine {
                     return Ok(answer);
                 }
             }
-            if self.pump(by)? {
+            if self.pump_or_wait(&mut patience)? {
                 continue;
             }
             if self.seen.paused {
-                by = Instant::now() + ANSWER_LIMIT;
+                patience.renew();
             } else {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: format!("the answer to '{asked}'"),
@@ -304,9 +315,9 @@ impl Machine {
     }
 
     fn run_to_the_end(&mut self) -> anyhow::Result<()> {
-        let by = Instant::now() + ANSWER_LIMIT;
+        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
         loop {
-            match self.pump(by) {
+            match self.pump_or_wait(&mut patience) {
                 Ok(true) => {}
                 Ok(false) => {
                     return Err(self.fail(Verdict::Hang {
@@ -325,13 +336,16 @@ impl Machine {
             self.pump(Instant::now() + ANSWER_LIMIT)?;
             return Err(error).context("QEMU's control socket is closed");
         }
-        let by = Instant::now() + ANSWER_LIMIT;
+        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
         loop {
             if let Some(answer) = self.answers.pop_front() {
                 return Ok(answer);
             }
-            if !self.pump(by)? {
-                return Err(anyhow!("QEMU does not answer '{execute}'"));
+            if !self.pump_or_wait(&mut patience)? {
+                self.seen
+                    .words
+                    .push(format!("(it does not answer '{execute}')"));
+                return Err(self.judge());
             }
         }
     }
@@ -341,6 +355,16 @@ impl Machine {
         self.control("qmp_capabilities", json!({}))?;
         self.control("cont", json!({}))?;
         Ok(())
+    }
+
+    /// Takes in one event. False when `patience` is over before there was one.
+    fn pump_or_wait(&mut self, patience: &mut Patience) -> anyhow::Result<bool> {
+        while !self.pump(Instant::now() + LOOK_UP)? {
+            if patience.is_over() {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     /// Takes in one event. True if there was one before `by`.
@@ -366,7 +390,8 @@ impl Machine {
             Event::Control(value) => self.take_control(value)?,
             event => self.seen.note(event),
         }
-        if self.seen.ended.is_some() {
+        // What the kernel said last may still be on its way when QEMU has ended.
+        if self.seen.ended.is_some() && self.seen.serial_closed {
             return Err(self.judge());
         }
         Ok(true)
@@ -390,8 +415,8 @@ impl Machine {
             self.seen.report.push(line);
             if whole {
                 self.keep_screen();
-                // The kernel waits for a byte before it ends QEMU.
-                let _ = self.serial.write_all(b"\n");
+                // The kernel waits for this byte before it ends QEMU.
+                let _ = self.serial.write_all(&[link::ACKNOWLEDGE]);
             }
         } else {
             self.lines.push_back(line);
@@ -487,7 +512,8 @@ impl Machine {
     /// Kills QEMU, if it has not ended, and waits until it has.
     fn end(&mut self) {
         while self.seen.ended.is_none() {
-            let _ = kill_process(self.process, Signal::KILL);
+            // QEMU, and all of it where --qemu names a script that starts one.
+            let _ = kill_process_group(self.process, Signal::KILL);
             match self.events.recv_timeout(ANSWER_LIMIT) {
                 Ok(event) => self.seen.note(event),
                 Err(_) => return,
@@ -509,6 +535,7 @@ impl Seen {
             Event::Words(line) => self.words.push(line),
             Event::Ended(Ok(status)) => self.ended = Some(status),
             Event::Ended(Err(error)) => self.words.push(error.to_string()),
+            Event::SerialClosed => self.serial_closed = true,
             Event::Line(_) | Event::Garbled(_) | Event::Control(_) => {}
         }
     }
@@ -602,7 +629,7 @@ fn listen(path: &Path) -> anyhow::Result<UnixListener> {
 
 /// Waits for QEMU to connect, or to end.
 fn accept(listener: &UnixListener, process: Pid, name: &str) -> anyhow::Result<UnixStream> {
-    let by = Instant::now() + ANSWER_LIMIT;
+    let mut patience = Patience::new(process, ANSWER_LIMIT);
     loop {
         match listener.accept() {
             Ok((stream, _)) => {
@@ -614,7 +641,7 @@ fn accept(listener: &UnixListener, process: Pid, name: &str) -> anyhow::Result<U
             Err(_) if test_kill_process(process).is_err() => {
                 bail!("it ended before it opened {name}")
             }
-            Err(_) if Instant::now() >= by => bail!("it never opened {name}"),
+            Err(_) if patience.is_over() => bail!("it never opened {name}"),
             Err(_) => thread::sleep(Duration::from_millis(2)),
         }
     }
@@ -628,7 +655,7 @@ fn never_connected(
     folder: &TempDir,
     config: &Config,
 ) -> anyhow::Error {
-    let _ = kill_process(process, Signal::KILL);
+    let _ = kill_process_group(process, Signal::KILL);
     let mut seen = Seen::default();
     while seen.ended.is_none()
         && let Ok(event) = events.recv_timeout(ANSWER_LIMIT)
@@ -688,6 +715,7 @@ fn read_serial(mut stream: UnixStream, folder: &Path, send: Sender<Event>) -> an
                 let _ = send.send(event);
             }
         }
+        let _ = send.send(Event::SerialClosed);
     });
     Ok(())
 }

@@ -77,9 +77,21 @@ pub fn stop() -> ! {
 pub fn fail(fault: link::Fault) -> ! {
     match fault {
         link::Fault::Panic => panic!("asked to, by 'fail panic'"),
+        link::Fault::PanicInLine => panic_in_line(),
         link::Fault::PageFault => cpu::page_fault(),
         link::Fault::StackOverflow => cpu::stack_overflow(),
         link::Fault::TripleFault => cpu::triple_fault(),
         link::Fault::Hang => stop(),
     }
+}
+
+fn panic_in_line() -> ! {
+    struct Broken;
+    impl core::fmt::Display for Broken {
+        fn fmt(&self, _: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+            panic!("asked to, by 'fail panic-in-line'")
+        }
+    }
+    crate::line!("half a line {Broken}");
+    unreachable!("a line with a panic in it was written")
 }

@@ -172,7 +172,10 @@ impl Show<'_> {
             line!("{purpose} ports {ports} map-mask {map_mask} stores {stores} bytes {bytes}");
         }
         if let Some(Pace { pictures, late, .. }) = self.pace {
-            line!("pace pictures {pictures} late {late}");
+            line!(
+                "pace pictures {pictures} late {late} tick {}",
+                timer::ticks()
+            );
         }
     }
 }

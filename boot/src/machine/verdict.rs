@@ -5,6 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::SystemTime;
 
+/// QEMU's command line, the serial log, and a last screendump.
+const EVIDENCE: [&str; 3] = ["command.txt", "serial.log", "screen.png"];
+
 /// Failures whose evidence is kept; older ones are removed.
 const KEPT: usize = 20;
 
@@ -110,14 +113,16 @@ impl fmt::Display for Verdict {
 /// What to make of QEMU's words.
 fn explain(words: &[String]) -> Option<&'static str> {
     let said = |text: &str| words.iter().any(|line| line.contains(text));
-    if said("lock") {
+    if said("Failed to get") && said("lock") {
         Some("Another program holds the disk image; end it, or boot a copy (`image --out FILE`).")
-    } else if said("gtk initialization failed") || said("display") {
+    } else if said("initialization failed") || said("cannot open display") {
         Some("The window could not be opened. `--headless` runs without one.")
     } else if said("No space left") {
         Some("The disk for temporary files is full; TMPDIR can name another folder.")
     } else if words.is_empty() {
-        Some("It said nothing: it was killed, or it crashed.")
+        Some(
+            "It said nothing: it was killed, or it crashed, or its arguments let it go on by itself (-daemonize does).",
+        )
     } else {
         None
     }
@@ -166,7 +171,7 @@ fn copy_evidence(folder: &Path, failures: &Path) -> std::io::Result<PathBuf> {
         .prefix(&format!("{seconds}-"))
         .tempdir_in(failures)?
         .keep();
-    for name in ["command.txt", "serial.log", "screen.png"] {
+    for name in EVIDENCE {
         match std::fs::copy(folder.join(name), kept.join(name)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
             _ => {}
@@ -192,11 +197,11 @@ impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.verdict)?;
         match &self.evidence {
-            Some(folder) => write!(
-                f,
-                "\nkept in {}: QEMU's command line, the serial log, the last screen",
-                folder.display()
-            ),
+            Some(folder) => {
+                let kept = EVIDENCE.iter().filter(|name| folder.join(name).exists());
+                let kept: Vec<_> = kept.copied().collect();
+                write!(f, "\nkept in {}: {}", folder.display(), kept.join(", "))
+            }
             None => Ok(()),
         }
     }

@@ -30,6 +30,8 @@ pub enum Command {
 pub enum Fault {
     /// `panic`
     Panic,
+    /// `panic-in-line`: in the middle of a line of an answer, with the serial line locked.
+    PanicInLine,
     /// `page-fault`
     PageFault,
     /// `stack-overflow`
@@ -42,8 +44,9 @@ pub enum Fault {
 
 impl Fault {
     /// Every fault with its name on the line.
-    pub const ALL: [(&'static str, Self); 5] = [
+    pub const ALL: [(&'static str, Self); 6] = [
         ("panic", Self::Panic),
+        ("panic-in-line", Self::PanicInLine),
         ("page-fault", Self::PageFault),
         ("stack-overflow", Self::StackOverflow),
         ("triple-fault", Self::TripleFault),
@@ -116,7 +119,9 @@ impl Command {
                 let fault = Fault::ALL.iter().find(|(name, _)| argument == Some(name));
                 return match fault {
                     Some(&(_, fault)) => Ok(Self::Fail(fault)),
-                    None => error("panic, page-fault, stack-overflow, triple-fault or hang"),
+                    None => error(
+                        "panic, panic-in-line, page-fault, stack-overflow, triple-fault or hang",
+                    ),
                 };
             }
             _ => return Err(CommandError::Unknown(command)),
@@ -184,8 +189,8 @@ mod tests {
             ("show 4294967296", "a frame number"),
             ("show 1 2", "at most one word"),
             ("hold on", "'hold' takes nothing"),
-            ("fail", "panic, page-fault"),
-            ("fail me", "panic, page-fault"),
+            ("fail", "panic, panic-in-line"),
+            ("fail me", "panic, panic-in-line"),
             ("hold *00000000", "says checksum 00000000"),
         ] {
             let error = Command::parse(line).unwrap_err().to_string();

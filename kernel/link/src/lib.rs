@@ -9,7 +9,8 @@
 //!
 //! The eight hex digits are the CRC-32 (ISO-HDLC) of everything before ` *`. A line ends in LF;
 //! a CR before it is not part of the line, since a terminal turns LF into CR LF. Lines are
-//! printable ASCII, at most [`MAX_LINE`] bytes.
+//! printable ASCII, at most [`MAX_LINE`] bytes. The byte [`CANCEL`] throws away what stood before
+//! it on its line.
 //!
 //! The host sends a [`Command`] a line; it may end it in a checksum too, and then the kernel
 //! checks it. The kernel answers with any number of lines and closes with one that begins with
@@ -42,8 +43,13 @@ pub const PANIC: &str = "panic";
 /// First word of an exception's first line.
 pub const EXCEPTION: &str = "exception";
 /// The last line of a panic's or exception's report. The kernel then waits, for a bounded time,
-/// for any byte: the host's word that it has taken its last screendump.
+/// for [`ACKNOWLEDGE`].
 pub const END_OF_REPORT: &str = "end of report";
+/// The byte (ACK) by which the host says that it has taken its last screendump.
+pub const ACKNOWLEDGE: u8 = 0x06;
+/// The byte (CAN) that throws away what has been said of a line so far: a report begins with it,
+/// since the failure may have happened in the middle of a line.
+pub const CANCEL: u8 = 0x18;
 /// First word of an answer's last line when the command was carried out.
 pub const OK: &str = "ok";
 /// First word of an answer's last line when it was not.

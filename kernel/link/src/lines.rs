@@ -1,6 +1,6 @@
 //! Bytes into lines.
 
-use crate::MAX_LINE;
+use crate::{CANCEL, MAX_LINE};
 
 /// Collects bytes until a line is whole, in a fixed buffer.
 #[derive(Clone, Debug)]
@@ -42,6 +42,10 @@ impl Lines {
     ///
     /// A CR counts only before the LF: anywhere else it is noise.
     pub fn push(&mut self, byte: u8) -> Option<Result<&str, Noise>> {
+        if byte == CANCEL {
+            (self.len, self.noise) = (0, None);
+            return None;
+        }
         if byte != b'\n' {
             match self.bytes.get_mut(self.len) {
                 Some(place) => {
@@ -108,6 +112,14 @@ mod tests {
                 Ok("hold".to_string()),
             ]
         );
+    }
+
+    #[test]
+    fn a_cancelled_line_leaves_nothing() {
+        let mut bytes = std::vec![b'x'; 2 * MAX_LINE];
+        bytes.extend_from_slice(b"\x18panic\n\xFFab\x18\nc\n");
+        let expected = ["panic", "", "c"].map(|text| Ok(text.to_string()));
+        assert_eq!(lines(&bytes), expected);
     }
 
     #[test]

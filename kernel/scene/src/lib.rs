@@ -5,7 +5,7 @@
 //! polygons in screen space and hands them to the mapper.
 //!
 //! All of it is integers and fixed point, so the same bits come out on the host and on the bare
-//! machine. A name that ends in a number of fraction bits has that many: `q16` is 16.16.
+//! machine.
 #![no_std]
 #![forbid(unsafe_code)]
 

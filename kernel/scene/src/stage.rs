@@ -41,7 +41,7 @@ pub struct Storage {
 }
 
 impl Storage {
-    /// Empty arenas. About 1.2 MiB: meant for a static.
+    /// Empty arenas. About 1.1 MiB: meant for a static.
     pub const fn new() -> Self {
         Self {
             surfaces: [0; SURFACE_BYTES],

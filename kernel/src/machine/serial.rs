@@ -2,12 +2,13 @@
 
 use core::fmt;
 
+use link::{ACKNOWLEDGE, CANCEL};
 use spin::Mutex;
 use uart_16550::backend::PioBackend;
 use uart_16550::spec::registers::IER;
 use uart_16550::{BaudRate, Config, Uart16550};
 
-use super::ports;
+use super::{ports, timer};
 
 /// COM1's base port.
 const COM1: u16 = 0x3F8;
@@ -72,22 +73,27 @@ fn port() -> Option<Uart16550<PioBackend>> {
 }
 
 /// A writer for reports of a panic or an exception: it goes past the lock, which the code that
-/// failed may hold, and never waits longer than [`PATIENCE`] for a byte to go out.
+/// failed may hold, and waits for the host no longer than [`PATIENCE`] in all.
 #[derive(Debug)]
-pub struct Unlocked(());
+pub struct Unlocked {
+    clock: timer::Countdown,
+}
 
-/// Reads of the line status until a host that does not take a byte is given up: a second or so.
-const PATIENCE: u32 = 1_000_000;
+/// Timer periods that a whole report may wait for its host: 5 s at 60 Hz, and 16 s if the failure
+/// came before the timer was set.
+const PATIENCE: u32 = 300;
 
 const LINE_STATUS: u16 = COM1 + 5;
 const DATA_READY: u8 = 0x01;
 const TRANSMITTER_EMPTY: u8 = 0x20;
 
 impl Unlocked {
-    /// Takes the port over; what the lock's holder had begun is ended as a line.
+    /// Takes the port over; what the lock's holder had begun of a line is cancelled.
     pub fn take_over() -> Self {
-        let mut this = Self(());
-        this.send(b"\n");
+        let mut this = Self {
+            clock: timer::Countdown::new(PATIENCE),
+        };
+        this.send(&[CANCEL]);
         this
     }
 
@@ -96,9 +102,14 @@ impl Unlocked {
         link::write_line(text, |bytes| self.send(bytes));
     }
 
-    /// Waits until the host sends any byte, for [`PATIENCE`] at the most.
+    /// Waits until the host acknowledges; commands that were under way are thrown away.
     pub fn wait_for_host(&mut self) {
-        self.wait(DATA_READY);
+        while self.wait(DATA_READY) {
+            // SAFETY: reading COM1's data register takes a byte and touches no memory.
+            if unsafe { ports::in8(COM1) } == ACKNOWLEDGE {
+                return;
+            }
+        }
     }
 
     fn send(&mut self, bytes: &[u8]) {
@@ -109,11 +120,15 @@ impl Unlocked {
         }
     }
 
-    fn wait(&mut self, status: u8) {
-        for _ in 0..PATIENCE {
+    /// Whether `status` came before patience was over.
+    fn wait(&mut self, status: u8) -> bool {
+        loop {
             // SAFETY: reading COM1's line status touches no memory.
             if unsafe { ports::in8(LINE_STATUS) } & status != 0 {
-                return;
+                return true;
+            }
+            if self.clock.is_over() {
+                return false;
             }
         }
     }

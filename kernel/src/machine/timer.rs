@@ -39,6 +39,46 @@ pub fn ticks() -> u32 {
     TICKS.load(Ordering::Relaxed)
 }
 
+/// A wait that needs no interrupts: it watches the timer's counter begin anew.
+#[derive(Debug)]
+pub struct Countdown {
+    periods: u32,
+    reads: u32,
+    last: u16,
+}
+
+impl Countdown {
+    /// Reads of the counter after which a timer that does not count is given up.
+    const READS: u32 = 50_000_000;
+    /// Latches channel 0's count.
+    const LATCH: u8 = 0x00;
+
+    /// Over when the timer has begun anew `periods` times while it was watched.
+    pub fn new(periods: u32) -> Self {
+        Self {
+            periods,
+            reads: Self::READS,
+            last: 0,
+        }
+    }
+
+    /// Whether it is over.
+    pub fn is_over(&mut self) -> bool {
+        // SAFETY: latching the count changes nothing but what is read next.
+        unsafe { ports::out8(COMMAND, Self::LATCH) };
+        // SAFETY: the timer's ports touch no memory. Low byte first, as it was set.
+        let [low, high] = [(); 2].map(|()| unsafe { ports::in8(CHANNEL_0) });
+        let count = u16::from_le_bytes([low, high]);
+        // It counts down.
+        if count > self.last {
+            self.periods = self.periods.saturating_sub(1);
+        }
+        self.last = count;
+        self.reads = self.reads.saturating_sub(1);
+        self.periods == 0 || self.reads == 0
+    }
+}
+
 /// The interrupt handler's part.
 pub(super) fn tick() {
     TICKS.fetch_add(1, Ordering::Relaxed);

@@ -1,0 +1,111 @@
+//! How long is too long, on a machine that may be busy with other things.
+//!
+//! A limit in wall time is wrong twice: beside other work a sound boot can take ten times its
+//! usual time, and a limit wide enough for that makes every real hang wait for it. QEMU's own
+//! processor time tells the two apart. A kernel that spins uses it up; one that has stopped, or
+//! never came, uses next to none of it; and one that only has to share the processor uses what
+//! it gets.
+
+use std::time::{Duration, Instant};
+
+use rustix::process::Pid;
+
+/// Between looks at whether QEMU idles.
+const LOOK: Duration = Duration::from_secs(5);
+/// Idle: less than this of one processor. A stopped machine was seen to use 1.3 % (its timers),
+/// one that boots beside a dozen busy processes on two cores some 15 %.
+const IDLE_PERCENT: u32 = 4;
+/// Wall time beyond which nothing is waited for, in limits.
+const AT_MOST: u32 = 15;
+
+/// Waiting for one thing.
+#[derive(Debug)]
+pub struct Patience {
+    process: Pid,
+    limit: Duration,
+    began: Instant,
+    used: Duration,
+    looked: (Instant, Duration),
+}
+
+impl Patience {
+    /// Waits until QEMU has worked for `limit`, or has idled when `limit` has passed.
+    pub fn new(process: Pid, limit: Duration) -> Self {
+        let (now, used) = (Instant::now(), processor_time(process));
+        Self {
+            process,
+            limit,
+            began: now,
+            used,
+            looked: (now, used),
+        }
+    }
+
+    /// Begins anew.
+    pub fn renew(&mut self) {
+        *self = Self::new(self.process, self.limit);
+    }
+
+    /// Whether it is over.
+    pub fn is_over(&mut self) -> bool {
+        let (now, used) = (Instant::now(), processor_time(self.process));
+        let (since, before) = self.looked;
+        let mut idle = false;
+        if now - since >= LOOK {
+            idle = (used - before) * 100 < (now - since) * IDLE_PERCENT;
+            self.looked = (now, used);
+        }
+        let waited = now - self.began;
+        used - self.used >= self.limit
+            || (idle && waited >= self.limit)
+            || waited >= self.limit * AT_MOST
+    }
+}
+
+/// The processor time that a process has used; for one that has ended, and where the system does
+/// not tell (only Linux does, in this way), none: then wall time decides.
+fn processor_time(process: Pid) -> Duration {
+    let told = std::fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero()));
+    // The second field is the program's name, in parentheses, with anything in it.
+    let fields = told.as_deref().ok().and_then(|stat| stat.rsplit_once(')'));
+    let mut fields = fields
+        .map_or("", |(_, fields)| fields)
+        .split_whitespace()
+        .skip(11);
+    let mut ticks = || fields.next()?.parse::<u64>().ok();
+    let all = ticks().unwrap_or(0) + ticks().unwrap_or(0);
+    Duration::from_millis(all * 1000 / rustix::param::clock_ticks_per_second().max(1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_process_that_works_uses_time() {
+        let own = rustix::process::getpid();
+        let before = processor_time(own);
+        let begun = Instant::now();
+        while begun.elapsed() < Duration::from_millis(300) {
+            std::hint::spin_loop();
+        }
+        assert!(processor_time(own) > before);
+        assert_eq!(
+            processor_time(Pid::from_raw(i32::MAX).unwrap()),
+            Duration::ZERO
+        );
+    }
+
+    #[test]
+    fn work_uses_patience_up() {
+        let mut patience = Patience::new(rustix::process::getpid(), Duration::from_millis(200));
+        assert!(!patience.is_over());
+        let begun = Instant::now();
+        while !patience.is_over() {
+            assert!(begun.elapsed() < Duration::from_secs(20));
+        }
+        assert!(begun.elapsed() >= Duration::from_millis(90));
+        patience.renew();
+        assert!(!patience.is_over());
+    }
+}
