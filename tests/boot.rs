@@ -28,14 +28,7 @@ static READY: LazyLock<Ready> =
     LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
 
 fn config() -> Config {
-    Config {
-        qemu: READY.qemu.path.clone(),
-        image: READY.image.clone(),
-        vga: "std".into(),
-        display: "none".into(),
-        arguments: Vec::new(),
-        failures: READY.image.with_file_name("failures"),
-    }
+    Config::new(&READY)
 }
 
 fn boot() -> Machine {
@@ -54,8 +47,7 @@ fn verdict<T: std::fmt::Debug>(result: anyhow::Result<T>) -> Failure {
 /// the test.
 fn emulate(frames: &[u32]) -> Vec<(Screen, Stats)> {
     let mut texels = Box::new([0; scene::TEXELS]);
-    scene::paint_ball(&mut texels);
-    let textures = [scene::ball_texture(&texels[..]).unwrap()];
+    let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);
     let mut storage = Box::new(Storage::new());
     let mut stage = Stage::new(&mut storage, scene);

@@ -16,14 +16,7 @@ const BOOTS: usize = 5;
 fn figures() {
     let options = Options::default();
     let ready = setup::ready(&options).expect("the set-up");
-    let config = Config {
-        qemu: ready.qemu.path,
-        image: ready.image.clone(),
-        vga: "std".into(),
-        display: "none".into(),
-        arguments: Vec::new(),
-        failures: ready.image.with_file_name("failures"),
-    };
+    let config = Config::new(&ready);
     let (mut set_ups, mut kernels, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..BOOTS {
         let start = Instant::now();

@@ -39,6 +39,7 @@ pub use verdict::{Failure, Verdict};
 
 use crate::child;
 use crate::screen::Screen;
+use crate::setup::Ready;
 
 /// From starting QEMU to the kernel's first line: ten times the 2 s that it takes alone.
 const BOOT_LIMIT: Duration = Duration::from_secs(20);
@@ -64,6 +65,20 @@ pub struct Config {
     pub arguments: Vec<OsString>,
     /// Where the evidence of a failure is kept, in a folder of its own each time.
     pub failures: PathBuf,
+}
+
+impl Config {
+    /// The image on QEMU's standard adapter, without a window; evidence is kept beside the image.
+    pub fn new(ready: &Ready) -> Self {
+        Self {
+            qemu: ready.qemu.path.clone(),
+            image: ready.image.clone(),
+            vga: "std".into(),
+            display: "none".into(),
+            arguments: Vec::new(),
+            failures: ready.image.with_file_name("failures"),
+        }
+    }
 }
 
 /// A QEMU that runs our image. Dropping it ends QEMU.
@@ -238,8 +253,7 @@ impl Machine {
     /// The lines of the next answer, up to the one that closes it. `asked` names it in errors.
     ///
     /// # Errors
-    /// A [`Failure`]; a hang if no answer comes in time. No time passes while the user has paused
-    /// the machine, as QEMU's window can.
+    /// A [`Failure`]; a hang if no answer comes in time.
     pub fn answer(&mut self, asked: &str) -> anyhow::Result<Vec<String>> {
         let mut patience = Patience::new(self.process, ANSWER_LIMIT);
         let mut answer = Vec::new();
@@ -254,12 +268,7 @@ impl Machine {
                     return Ok(answer);
                 }
             }
-            if self.pump_or_wait(&mut patience)? {
-                continue;
-            }
-            if self.seen.paused {
-                patience.renew();
-            } else {
+            if !self.pump_or_wait(&mut patience)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: format!("the answer to '{asked}'"),
                 }));
@@ -357,10 +366,13 @@ impl Machine {
         Ok(())
     }
 
-    /// Takes in one event. False when `patience` is over before there was one.
+    /// Takes in one event. False when `patience` is over before there was one; it does not run out
+    /// while the user has paused the machine, as QEMU's window can.
     fn pump_or_wait(&mut self, patience: &mut Patience) -> anyhow::Result<bool> {
         while !self.pump(Instant::now() + LOOK_UP)? {
-            if patience.is_over() {
+            if self.seen.paused {
+                patience.renew();
+            } else if patience.is_over() {
                 return Ok(false);
             }
         }
@@ -708,8 +720,7 @@ fn read_serial(mut stream: UnixStream, folder: &Path, send: Sender<Event>) -> an
                 greeted |= text.is_ok();
                 let event = match text {
                     Ok(text) => Event::Line(text.to_string()),
-                    // An empty line ends whatever stood before the kernel's own lines.
-                    Err(_) if !greeted || line == Ok("") => continue,
+                    Err(_) if !greeted => continue,
                     Err(why) => Event::Garbled(why),
                 };
                 let _ = send.send(event);

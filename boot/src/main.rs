@@ -176,7 +176,6 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
         .into_iter()
         .find(|window| displays.iter().any(|display| display == window))
         .filter(|_| !boot.headless && has_display());
-    let folder = ready.image.parent().context("the image lies in a folder")?;
     if window.is_none() && !boot.headless {
         let why = if has_display() {
             "this QEMU has no window (on Debian the package qemu-system-gui brings one)"
@@ -188,12 +187,10 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
-        qemu: ready.qemu.path.clone(),
-        image: ready.image.clone(),
         vga: boot.vga.clone(),
         display: window.unwrap_or("none").to_string(),
         arguments,
-        failures: folder.join("failures"),
+        ..Config::new(ready)
     })?;
     machine.wait_until_running()?;
     let seconds = start.elapsed().as_secs_f64();
@@ -205,7 +202,7 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
         return machine.watch();
     }
     machine.rest(WARM_UP)?;
-    let picture = folder.join("picture.png");
+    let picture = ready.image.with_file_name("picture.png");
     let screen = machine.screendump()?;
     aside::write(&picture, |file| screen.write_png(file))?;
     machine.leave()?;

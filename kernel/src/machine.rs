@@ -27,8 +27,8 @@ pub struct Machine {
 /// Makes the machine ready. Called once, at the start.
 pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     serial::init();
-    // An LF first: it ends whatever firmware may have left on the line.
-    serial::end_line();
+    // Firmware may have left something on the line.
+    serial::cancel_line();
     crate::line!(
         "{HELLO} crystal-ball {} protocol {PROTOCOL}",
         env!("CARGO_PKG_VERSION")

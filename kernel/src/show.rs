@@ -27,8 +27,7 @@ static MEMORY: Mutex<Memory> = Mutex::new(Memory {
 /// Runs the show until the machine ends.
 pub fn run(machine: Machine) -> ! {
     let memory = &mut *MEMORY.lock();
-    scene::paint_ball(&mut memory.texels);
-    let textures = [scene::ball_texture(&memory.texels).expect("the ball's texture has its size")];
+    let textures = [scene::paint_ball(&mut memory.texels)];
     let scene = scene::ball(&textures);
     let card = ModeX::set(Counted::new(machine.vga), scene.palette);
     let mut show = Show {

@@ -120,9 +120,7 @@ fn explain(words: &[String]) -> Option<&'static str> {
     } else if said("No space left") {
         Some("The disk for temporary files is full; TMPDIR can name another folder.")
     } else if words.is_empty() {
-        Some(
-            "It said nothing: it was killed, or it crashed, or its arguments let it go on by itself (-daemonize does).",
-        )
+        Some("It said nothing: it was killed, or it crashed.")
     } else {
         None
     }

@@ -47,8 +47,9 @@ pub const EXCEPTION: &str = "exception";
 pub const END_OF_REPORT: &str = "end of report";
 /// The byte (ACK) by which the host says that it has taken its last screendump.
 pub const ACKNOWLEDGE: u8 = 0x06;
-/// The byte (CAN) that throws away what has been said of a line so far: a report begins with it,
-/// since the failure may have happened in the middle of a line.
+/// The byte (CAN) that throws away what has been said of a line so far. The kernel's first line
+/// begins with it, since firmware may have spoken before, and so does a report, since the failure
+/// may have happened in the middle of a line.
 pub const CANCEL: u8 = 0x18;
 /// First word of an answer's last line when the command was carried out.
 pub const OK: &str = "ok";

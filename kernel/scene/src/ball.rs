@@ -1,7 +1,7 @@
 //! The ball: a globe of flat facets with one texture over all of them.
 
 use modex::HEIGHT;
-use texmap::{Texture, TextureError};
+use texmap::Texture;
 
 use crate::colour::{BACKGROUND, LIGHT_TABLE, PALETTE};
 use crate::trig::{cos, mul, sin};
@@ -32,7 +32,7 @@ struct Solid {
 static BALL: Solid = build();
 
 /// Paints the ball's texture, in full light.
-pub fn paint_ball(texels: &mut [u8; TEXELS]) {
+pub fn paint_ball(texels: &mut [u8; TEXELS]) -> Texture<'_> {
     for (j, row) in texels
         .chunks_exact_mut(usize::from(TEXTURE_WIDTH))
         .enumerate()
@@ -44,17 +44,10 @@ pub fn paint_ball(texels: &mut [u8; TEXELS]) {
             *texel = paint::texel(longitude, polar, on_sphere(longitude, polar));
         }
     }
+    Texture::new(texels, TEXTURE_WIDTH, TEXTURE_HEIGHT).expect("there are TEXELS texels")
 }
 
-/// The ball's texture, once painted.
-///
-/// # Errors
-/// None for a slice of [`TEXELS`] texels.
-pub fn ball_texture(texels: &[u8]) -> Result<Texture<'_>, TextureError> {
-    Texture::new(texels, TEXTURE_WIDTH, TEXTURE_HEIGHT)
-}
-
-/// The ball before its background. `textures` holds [`ball_texture`].
+/// The ball before its background. `textures` holds what [`paint_ball`] painted.
 pub fn ball<'a>(textures: &'a [Texture<'a>]) -> Scene<'a> {
     const _: () = assert!(BACKGROUND.len() == HEIGHT);
     Scene {

@@ -19,7 +19,7 @@ mod pose;
 mod stage;
 pub mod trig;
 
-pub use ball::{TEXELS, ball, ball_texture, paint_ball};
+pub use ball::{TEXELS, ball, paint_ball};
 pub use camera::{FOCAL_LENGTH, NEAR, project};
 pub use colour::{LIGHT_LEVELS, LightTable};
 pub use mesh::{Corner, Face, Mesh, Vec3};

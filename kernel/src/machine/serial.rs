@@ -47,10 +47,10 @@ pub fn line(text: fmt::Arguments<'_>) {
     }
 }
 
-/// Ends the line that something else may have begun.
-pub fn end_line() {
+/// Cancels the line that something else may have begun.
+pub fn cancel_line() {
     if let Some(uart) = &mut *SERIAL.lock() {
-        uart.send_bytes_exact(b"\n");
+        uart.send_bytes_exact(&[CANCEL]);
     }
 }
 

@@ -8,8 +8,7 @@ use scene::{Pose, Stage, Storage};
 #[test]
 fn every_picture_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
     let mut texels = Box::new([0; scene::TEXELS]);
-    scene::paint_ball(&mut texels);
-    let textures = [scene::ball_texture(&texels[..]).unwrap()];
+    let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);
     let mut storage = Box::new(Storage::new());
     let mut stage = Stage::new(&mut storage, scene);
