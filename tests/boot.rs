@@ -17,8 +17,8 @@ use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::screen::Screen;
 use crystal_ball::setup::{self, Options, Ready};
 use emulator::Vga;
-use emulator::scanout::Picture;
-use link::{Command, Fault};
+use emulator::scanout;
+use link::{Command, Fault, Picture};
 use modex::ModeX;
 use modex::registers::MODE_X;
 use scene::{Pose, Stage, Storage};
@@ -63,7 +63,7 @@ fn emulate(frames: &[u32]) -> Vec<(Screen, Stats)> {
 }
 
 /// A picture with its six bits a colour widened to eight as QEMU's DAC does.
-fn as_qemu_shows(picture: Picture) -> Screen {
+fn as_qemu_shows(picture: scanout::Picture) -> Screen {
     let widen = |colour: [u8; 3]| colour.map(|v| (v << 2) | ((v & 1) * 3));
     Screen {
         width: picture.width,
@@ -75,7 +75,7 @@ fn as_qemu_shows(picture: Picture) -> Screen {
 #[test]
 fn the_registers_read_back_as_the_table_says() {
     let mut machine = boot();
-    machine.ask(Command::Show(0)).unwrap();
+    machine.ask(Command::Show(Picture::Frame(0))).unwrap();
     let answer = machine.ask(Command::Registers).unwrap();
     for ((block, expected), line) in MODE_X.blocks().into_iter().zip(&answer) {
         let (name, values) = line.split_once(' ').unwrap();
@@ -121,7 +121,7 @@ fn every_page_shows_what_the_emulated_card_shows() {
     let expected = emulate(&frames);
     let mut machine = boot();
     for (i, (frame, (picture, _))) in frames.iter().zip(&expected).enumerate() {
-        let answer = machine.ask(Command::Show(*frame)).unwrap();
+        let answer = machine.ask(Command::Show(Picture::Frame(*frame))).unwrap();
         assert_eq!(answer, [format!("page {}", (i + 1) % 3)]);
         assert_same(
             &machine.screendump().unwrap(),
@@ -178,7 +178,9 @@ fn every_adapter_with_a_vga_core_shows_the_same() {
         config.arguments = arguments.split_whitespace().map(Into::into).collect();
         let what = format!("-vga {vga} {arguments}");
         let mut machine = Machine::boot(&config).unwrap_or_else(|error| panic!("{what}: {error}"));
-        machine.ask(Command::Show(480)).expect(&what);
+        machine
+            .ask(Command::Show(Picture::Frame(480)))
+            .expect(&what);
         assert_same(&machine.screendump().unwrap(), &picture, &what);
         machine.leave().expect(&what);
     }
@@ -191,7 +193,7 @@ fn map_mask_is_written_once_for_each_column() {
         .iter()
         .zip(emulate(&[0, 1000, u32::MAX]))
     {
-        machine.ask(Command::Show(*frame)).unwrap();
+        machine.ask(Command::Show(Picture::Frame(*frame))).unwrap();
         let counts = machine.ask(Command::Counts).unwrap();
         let number = |line: &str, name: &str| -> u32 {
             let line = counts
@@ -263,7 +265,7 @@ fn noise_on_the_line_is_answered_and_survived() {
     machine.ask(Command::Hold).unwrap();
     for (noise, reason) in [
         (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
-        (vec![b'x'; 100_000], "more than 512 bytes"),
+        (vec![b'x'; 100_000], "more than 700 bytes"),
         (b"show 4294967296\n".to_vec(), "a frame number"),
         (b"shew 1\n".to_vec(), "no command 'shew'"),
         (b"show 1 *00000000\n".to_vec(), "says checksum 00000000"),

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::setup::{self, Options};
-use link::Command;
+use link::{Command, Picture};
 
 /// How long the running show is watched.
 const WATCHED: Duration = Duration::from_secs(60);
@@ -50,10 +50,14 @@ fn figures() {
     );
     println!("writes for a picture:");
     for frame in [0, 240, 480] {
-        machine.ask(Command::Show(frame)).expect("shows");
+        machine
+            .ask(Command::Show(Picture::Frame(frame)))
+            .expect("shows");
         // The pages' first pictures paint all of the background; the third round is the rule.
         for _ in 0..5 {
-            machine.ask(Command::Show(frame)).expect("shows");
+            machine
+                .ask(Command::Show(Picture::Frame(frame)))
+                .expect("shows");
         }
         println!("frame {frame}");
         for line in machine.ask(Command::Counts).expect("answers") {

@@ -29,10 +29,10 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     serial::init();
     // Firmware may have left something on the line.
     serial::cancel_line();
-    crate::line!(
+    serial::line(format_args!(
         "{HELLO} crystal-ball {} protocol {PROTOCOL}",
-        env!("CARGO_PKG_VERSION")
-    );
+        show::VERSION
+    ));
     cpu::init(boot_info.kernel_stack_bottom);
     timer::start();
     let offset = boot_info
@@ -92,6 +92,6 @@ fn panic_in_line() -> ! {
             panic!("asked to, by 'fail panic-in-line'")
         }
     }
-    crate::line!("half a line {Broken}");
+    serial::line(format_args!("half a line {Broken}"));
     unreachable!("a line with a panic in it was written")
 }

@@ -1,8 +1,8 @@
 //! The kernel: Crystal Ball on the bare machine.
 //!
-//! Two parts. [`machine`] is the edge: ports, video memory, interrupts, the serial line, and all
-//! of the kernel's `unsafe`. [`show`] is the program: it draws pictures and answers commands.
-//! Whatever goes wrong is reported on the serial line in words and ends QEMU with a code of its
+//! It is the machine's edge, and no more: ports, video memory, interrupts, the serial line, all in
+//! [`machine`] and with all of the kernel's `unsafe`. The program that draws pictures and answers
+//! commands is the crate [`show`], which runs on the host as well. Whatever goes wrong is reported on the serial line in words and ends QEMU with a code of its
 //! own; the kernel never restarts by itself.
 //!
 //! All of it compiles for the host as well, where it says what to do instead; only the entry
@@ -10,9 +10,14 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 mod machine;
-mod show;
 
 use bootloader_api::{BootInfo, BootloaderConfig, config::Mapping};
+use machine::{serial, timer};
+use show::{Memory, Request, Show};
+use spin::Mutex;
+
+/// The fixed memory of the program.
+static MEMORY: Mutex<Memory> = Mutex::new(Memory::new());
 
 /// What the kernel asks of the boot loader.
 static BOOT: BootloaderConfig = {
@@ -24,7 +29,24 @@ static BOOT: BootloaderConfig = {
 
 fn start(boot_info: &'static mut BootInfo) -> ! {
     let machine = machine::init(boot_info);
-    show::run(machine)
+    let mut memory = MEMORY.lock();
+    let mut show = Show::new(&mut memory, machine.vga);
+    let out: &mut show::Out<'_> = &mut |line| serial::line(line);
+    loop {
+        while let Some(byte) = serial::receive() {
+            match show.receive(byte, timer::ticks(), out) {
+                Some(Request::Fail(fault)) => machine::fail(fault),
+                Some(Request::Leave) => machine::exit(link::Exit::Left),
+                None => {}
+            }
+        }
+        let tick = timer::ticks();
+        if show.is_due(tick) {
+            show.present(tick, out);
+        } else {
+            machine::sleep_while(|| timer::ticks() == tick && !serial::has_received());
+        }
+    }
 }
 
 #[cfg(target_os = "none")]

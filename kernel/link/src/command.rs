@@ -12,17 +12,94 @@ pub enum Command {
     Hold,
     /// `run`: let the show run.
     Run,
-    /// `show N`: draw picture N on the next page, flip, and answer when the flip holds. A show
+    /// `show PICTURE`: draw it on the next page, flip, and answer when the flip holds. A show
     /// that runs is held first.
-    Show(u32),
+    Show(Picture),
+    /// `dump` or `dump all`: what the card holds, read back from it, as [`crate::dump`] writes it.
+    Dump(Content),
+    /// `checksums` or `checksums all`: the CRC-32 of the same, and no byte of it.
+    Checksums(Content),
     /// `registers`: every register of the mode, read back.
     Registers,
     /// `counts`: what the last picture took, and how the show keeps its pace.
     Counts,
+    /// `state`: running or held, and what is on the screen.
+    State,
+    /// `version`: of the program, the protocol and the dumps.
+    Version,
     /// `fail KIND`: break in the way that is named, to prove that the host notices.
     Fail(Fault),
     /// `leave`: end QEMU with the code for success.
     Leave,
+}
+
+/// A picture by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Picture {
+    /// `N`: the scene's default pose at tick N.
+    Frame(u32),
+    /// `pose YAW PITCH ROLL DISTANCE`, each in up to eight hex digits: the angles as 32-bit
+    /// fractions of a turn, the distance in 16.16.
+    Pose {
+        /// About the solid's own axis.
+        yaw: u32,
+        /// About the screen's horizontal.
+        pitch: u32,
+        /// About the line of sight.
+        roll: u32,
+        /// From the eye to the solid's centre.
+        distance: u32,
+    },
+}
+
+impl Picture {
+    /// Reads a name, as [`fmt::Display`] writes it.
+    pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
+        let picture = match words.next()? {
+            "pose" => {
+                let mut hex = || {
+                    let word = words.next().filter(|word| word.len() <= 8)?;
+                    // `from_str_radix` would take a sign.
+                    let digits = word.bytes().all(|b| b.is_ascii_hexdigit());
+                    u32::from_str_radix(word, 16).ok().filter(|_| digits)
+                };
+                Self::Pose {
+                    yaw: hex()?,
+                    pitch: hex()?,
+                    roll: hex()?,
+                    distance: hex()?,
+                }
+            }
+            number if number.bytes().all(|b| b.is_ascii_digit()) => {
+                Self::Frame(number.parse().ok()?)
+            }
+            _ => return None,
+        };
+        words.next().is_none().then_some(picture)
+    }
+}
+
+impl fmt::Display for Picture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Frame(frame) => write!(f, "{frame}"),
+            Self::Pose {
+                yaw,
+                pitch,
+                roll,
+                distance,
+            } => write!(f, "pose {yaw:08x} {pitch:08x} {roll:08x} {distance:08x}"),
+        }
+    }
+}
+
+/// How much of video memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// The page on the screen.
+    Page,
+    /// All four planes, 64 KiB each.
+    Memory,
 }
 
 /// A way to break.
@@ -75,7 +152,8 @@ impl fmt::Display for CommandError<'_> {
         match self {
             Self::Unknown(word) => write!(
                 f,
-                "no command '{word}'; there are hold, run, show N, registers, counts, fail KIND, leave"
+                "no command '{word}'; there are hold, run, show PICTURE, dump, checksums, \
+                 registers, counts, state, version, fail KIND, leave"
             ),
             Self::Arguments { command, takes } => write!(f, "'{command}' takes {takes}"),
             Self::Checksum(error) => error.fmt(f),
@@ -96,40 +174,45 @@ impl Command {
         };
         let mut words = text.split_ascii_whitespace();
         let command = words.next().unwrap_or("");
-        let argument = words.next();
-        let error = |takes| Err(CommandError::Arguments { command, takes });
-        if words.next().is_some() {
-            return error("at most one word");
+        let takes = |takes| CommandError::Arguments { command, takes };
+        if command == "show" {
+            let picture = Picture::parse(words);
+            return picture.map(Self::Show).ok_or(takes(
+                "a frame number, 0 to 4294967295, or 'pose' and four hex numbers: \
+                 yaw, pitch, roll, distance",
+            ));
         }
+        let argument = words.next();
+        if words.next().is_some() {
+            return Err(takes("at most one word"));
+        }
+        let content = || match argument {
+            None => Ok(Content::Page),
+            Some("all") => Ok(Content::Memory),
+            Some(_) => Err(takes("nothing, or 'all'")),
+        };
         let plain = match command {
+            "dump" => return content().map(Self::Dump),
+            "checksums" => return content().map(Self::Checksums),
+            "fail" => {
+                let fault = Fault::ALL.iter().find(|(name, _)| argument == Some(name));
+                return fault.map(|&(_, fault)| Self::Fail(fault)).ok_or(takes(
+                    "panic, panic-in-line, page-fault, stack-overflow, triple-fault or hang",
+                ));
+            }
             "hold" => Self::Hold,
             "run" => Self::Run,
             "registers" => Self::Registers,
             "counts" => Self::Counts,
+            "state" => Self::State,
+            "version" => Self::Version,
             "leave" => Self::Leave,
-            "show" => {
-                // `parse` would take a leading plus sign.
-                let number = argument.filter(|a| a.bytes().all(|b| b.is_ascii_digit()));
-                return match number.and_then(|a| a.parse().ok()) {
-                    Some(frame) => Ok(Self::Show(frame)),
-                    None => error("a frame number, 0 to 4294967295"),
-                };
-            }
-            "fail" => {
-                let fault = Fault::ALL.iter().find(|(name, _)| argument == Some(name));
-                return match fault {
-                    Some(&(_, fault)) => Ok(Self::Fail(fault)),
-                    None => error(
-                        "panic, panic-in-line, page-fault, stack-overflow, triple-fault or hang",
-                    ),
-                };
-            }
             _ => return Err(CommandError::Unknown(command)),
         };
-        if argument.is_some() {
-            return error("nothing");
+        match argument {
+            None => Ok(plain),
+            Some(_) => Err(takes("nothing")),
         }
-        Ok(plain)
     }
 }
 
@@ -138,9 +221,15 @@ impl fmt::Display for Command {
         match self {
             Self::Hold => f.write_str("hold"),
             Self::Run => f.write_str("run"),
-            Self::Show(frame) => write!(f, "show {frame}"),
+            Self::Show(picture) => write!(f, "show {picture}"),
+            Self::Dump(Content::Page) => f.write_str("dump"),
+            Self::Dump(Content::Memory) => f.write_str("dump all"),
+            Self::Checksums(Content::Page) => f.write_str("checksums"),
+            Self::Checksums(Content::Memory) => f.write_str("checksums all"),
             Self::Registers => f.write_str("registers"),
             Self::Counts => f.write_str("counts"),
+            Self::State => f.write_str("state"),
+            Self::Version => f.write_str("version"),
             Self::Fail(fault) => {
                 let name = Fault::ALL.iter().find(|(_, f)| f == fault);
                 write!(f, "fail {}", name.map_or("", |(name, _)| name))
@@ -162,10 +251,22 @@ mod tests {
         let mut commands = std::vec![
             Command::Hold,
             Command::Run,
-            Command::Show(0),
-            Command::Show(u32::MAX),
+            Command::Show(Picture::Frame(0)),
+            Command::Show(Picture::Frame(u32::MAX)),
+            Command::Show(Picture::Pose {
+                yaw: u32::MAX,
+                pitch: 0,
+                roll: 0x0123_abcd,
+                distance: 1,
+            }),
+            Command::Dump(Content::Page),
+            Command::Dump(Content::Memory),
+            Command::Checksums(Content::Page),
+            Command::Checksums(Content::Memory),
             Command::Registers,
             Command::Counts,
+            Command::State,
+            Command::Version,
             Command::Leave,
         ];
         commands.extend(Fault::ALL.map(|(_, fault)| Command::Fail(fault)));
@@ -187,7 +288,13 @@ mod tests {
             ("show -1", "a frame number"),
             ("show +1", "a frame number"),
             ("show 4294967296", "a frame number"),
-            ("show 1 2", "at most one word"),
+            ("show 1 2", "a frame number"),
+            ("show pose 1 2 3", "four hex numbers"),
+            ("show pose 1 2 3 4 5", "four hex numbers"),
+            ("show pose +1 2 3 4", "four hex numbers"),
+            ("show pose 1 2 3 123456789", "four hex numbers"),
+            ("dump it", "nothing, or 'all'"),
+            ("checksums all all", "at most one word"),
             ("hold on", "'hold' takes nothing"),
             ("fail", "panic, panic-in-line"),
             ("fail me", "panic, panic-in-line"),

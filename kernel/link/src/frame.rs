@@ -11,46 +11,99 @@ static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// ` *` and eight digits.
 const CHECKSUM: usize = 10;
 
+/// The CRC-32 (ISO-HDLC) of bytes that come in pieces.
+#[derive(Clone)]
+pub struct Checksum(Digest<'static, u32>);
+
+impl Checksum {
+    /// Of nothing.
+    pub fn new() -> Self {
+        Self(CRC.digest())
+    }
+
+    /// Takes the next bytes in.
+    pub fn add(&mut self, bytes: &[u8]) {
+        self.0.update(bytes);
+    }
+
+    /// The checksum of all of them.
+    pub fn value(&self) -> u32 {
+        self.0.clone().finalize()
+    }
+}
+
+impl Default for Checksum {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl fmt::Debug for Checksum {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Checksum({:08x})", self.value())
+    }
+}
+
+/// Bytes that are collected before they are summed and sent.
+const CHUNK: usize = 64;
+
+/// The text of a line on its way out: made printable, cut, summed.
+struct Summed<F> {
+    send: F,
+    checksum: Checksum,
+    room: usize,
+    chunk: [u8; CHUNK],
+    collected: usize,
+}
+
+impl<F: FnMut(&[u8])> Summed<F> {
+    fn flush(&mut self) {
+        let chunk = &self.chunk[..core::mem::take(&mut self.collected)];
+        self.checksum.add(chunk);
+        (self.send)(chunk);
+    }
+}
+
+impl<F: FnMut(&[u8])> Write for Summed<F> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for c in text.chars() {
+            if self.room == 0 {
+                break;
+            }
+            self.room -= 1;
+            self.chunk[self.collected] = match c {
+                ' '..='~' => c as u8,
+                _ => b'?',
+            };
+            self.collected += 1;
+            if self.collected == CHUNK {
+                self.flush();
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Writes `text` as a line: checksum and LF at its end. What is not printable ASCII goes out as
 /// `?`, and text beyond [`MAX_LINE`] is left out, so that every line written is a legal one.
-pub fn write_line(text: fmt::Arguments<'_>, mut send: impl FnMut(&[u8])) {
-    struct Summed<'a, F> {
-        send: &'a mut F,
-        digest: Digest<'a, u32>,
-        room: usize,
-    }
-    impl<F: FnMut(&[u8])> Write for Summed<'_, F> {
-        fn write_str(&mut self, text: &str) -> fmt::Result {
-            for c in text.chars().take(self.room) {
-                let byte = match c {
-                    ' '..='~' => c as u8,
-                    _ => b'?',
-                };
-                self.digest.update(&[byte]);
-                (self.send)(&[byte]);
-                self.room -= 1;
-            }
-            Ok(())
-        }
-    }
+pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
     let mut summed = Summed {
-        send: &mut send,
-        digest: CRC.digest(),
+        send,
+        checksum: Checksum::new(),
         room: MAX_LINE - CHECKSUM,
+        chunk: [0; CHUNK],
+        collected: 0,
     };
-    // The writer above never fails, and what a Display implementation makes of that is its own.
+    // The writer never fails, and what a Display implementation makes of that is its own.
     let _ = summed.write_fmt(text);
-    let sum = summed.digest.finalize();
-    let mut tail = *b" *00000000\n";
-    for (i, digit) in tail[2..10].iter_mut().enumerate() {
-        let nibble = (sum >> (28 - 4 * i) & 15) as u8;
-        *digit = if nibble < 10 {
-            b'0' + nibble
-        } else {
-            b'a' + nibble - 10
-        };
-    }
-    send(&tail);
+    summed.flush();
+    let sum = summed.checksum.value();
+    // The tail is no part of the text: it must always fit, and is not summed.
+    summed.room = CHECKSUM + 1;
+    let _ = write!(summed, " *{sum:08x}");
+    summed.chunk[summed.collected] = b'\n';
+    summed.collected += 1;
+    summed.flush();
 }
 
 /// Why a line's checksum was not accepted.

@@ -23,17 +23,19 @@
 #![forbid(unsafe_code)]
 
 mod command;
+pub mod dump;
 mod frame;
 mod lines;
 
-pub use command::{Command, CommandError, Fault};
-pub use frame::{FrameError, unframe, write_line};
+pub use command::{Command, CommandError, Content, Fault, Picture};
+pub use frame::{Checksum, FrameError, unframe, write_line};
 pub use lines::{Lines, Noise};
 
 /// The protocol's version, in the kernel's first line.
-pub const PROTOCOL: u32 = 1;
-/// Longest line in bytes, its checksum included, its end not.
-pub const MAX_LINE: usize = 512;
+pub const PROTOCOL: u32 = 2;
+/// Longest line in bytes, its checksum included, its end not: 320 pixels of a dump with their
+/// label take 657.
+pub const MAX_LINE: usize = 700;
 /// First word of the kernel's first line.
 pub const HELLO: &str = "hello";
 /// The line that says that the first picture is on the screen.

@@ -5,7 +5,7 @@ use crate::Column;
 /// Why an access is made, so that a bus that counts can count apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Purpose {
-    /// Setting the mode, the palette, reading registers back.
+    /// Setting the mode and the palette; reading registers and memory back.
     Setup,
     /// Drawing columns.
     Draw,
@@ -34,6 +34,8 @@ pub trait Bus {
     fn in16(&mut self, port: u16) -> u16;
     /// Stores eight bytes at `at..at + 8`, little end first. `at` is a multiple of 8.
     fn store64(&mut self, at: u16, bytes: u64);
+    /// Loads the byte at `at`, of the plane that Read Map names. All four latches are filled.
+    fn load8(&mut self, at: u16) -> u8;
     /// Lends `draw` the `len` bytes at `at`, `at + 80`, ..., and carries out what it stored
     /// before returning. All of them lie inside the window.
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>));
@@ -61,6 +63,10 @@ impl<B: Bus> Bus for &mut B {
 
     fn store64(&mut self, at: u16, bytes: u64) {
         B::store64(self, at, bytes);
+    }
+
+    fn load8(&mut self, at: u16) -> u8 {
+        B::load8(self, at)
     }
 
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {

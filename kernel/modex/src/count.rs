@@ -115,6 +115,10 @@ impl<B: Bus> Bus for Counted<B> {
         self.bus.store64(at, bytes);
     }
 
+    fn load8(&mut self, at: u16) -> u8 {
+        self.bus.load8(at)
+    }
+
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
         let tally = self.counts.of(self.purpose);
         tally.stores += u64::from(len);

@@ -191,6 +191,33 @@ impl<B: Bus> ModeX<B> {
         read_mode(&mut self.bus)
     }
 
+    /// The start address of [`ModeX::shown_page`].
+    pub fn start_address(&self) -> u16 {
+        page_start(self.front) as u16
+    }
+
+    /// Reads pixels back from the card: pixel i is in plane i & 3 at `at` + i / 4, which wraps
+    /// within the plane. No byte of video memory is written.
+    pub fn load(&mut self, at: u16, pixels: &mut [u8]) {
+        self.bus.purpose(Purpose::Setup);
+        for plane in 0..4 {
+            write(&mut self.bus, GRAPHICS, READ_MAP, plane);
+            let of_plane = pixels.iter_mut().skip(usize::from(plane)).step_by(4);
+            for (i, pixel) in (0..).zip(of_plane) {
+                *pixel = self.bus.load8(at.wrapping_add(i));
+            }
+        }
+        let read_map = MODE_X.graphics[usize::from(READ_MAP)];
+        write(&mut self.bus, GRAPHICS, READ_MAP, read_map);
+    }
+
+    /// Reads the palette back from the DAC.
+    pub fn palette(&mut self) -> Palette {
+        self.bus.purpose(Purpose::Setup);
+        self.bus.out8(PEL_READ, 0);
+        [(); 256].map(|()| [(); 3].map(|()| self.bus.in8(PEL_DATA)))
+    }
+
     /// The bus underneath.
     pub fn bus(&mut self) -> &mut B {
         &mut self.bus

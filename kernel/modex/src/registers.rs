@@ -21,6 +21,8 @@ pub const MISC_READ: u16 = 0x3CC;
 pub const INPUT_STATUS_1: u16 = 0x3DA;
 /// PEL Mask: gates the index on its way to the DAC.
 pub const PEL_MASK: u16 = 0x3C6;
+/// PEL Address, read: the DAC entry that the next triplet is read from.
+pub const PEL_READ: u16 = 0x3C7;
 /// PEL Address, write: the DAC entry that the next triplet goes to.
 pub const PEL_WRITE: u16 = 0x3C8;
 /// PEL Data: red, green, blue, 6 bits each; the index steps after the third.
@@ -59,6 +61,8 @@ pub const CLOCKING_MODE: u8 = 0x01;
 pub const SCREEN_DISABLE: u8 = 0x20;
 /// SR2 Map Mask: the planes that a store reaches.
 pub const MAP_MASK: u8 = 0x02;
+/// GR4 Read Map: the plane that a load returns.
+pub const READ_MAP: u8 = 0x04;
 /// Map Mask with all four planes.
 pub const ALL_PLANES: u8 = 0x0F;
 /// CR0C Start Address High.

@@ -15,6 +15,7 @@ enum Access {
     Out16(u16, u16),
     In(u16),
     Store(u16),
+    Load(u16),
 }
 
 /// Remembers every access, and models just enough to read registers back and to look into the
@@ -116,6 +117,12 @@ impl Bus for Recorder {
         for (i, byte) in bytes.to_le_bytes().into_iter().enumerate() {
             self.store(usize::from(at) + i, byte);
         }
+    }
+
+    fn load8(&mut self, at: u16) -> u8 {
+        self.log.push(Access::Load(at));
+        let plane = self.registers[&(GRAPHICS, READ_MAP)];
+        self.planes[usize::from(plane)][usize::from(at)]
     }
 
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
@@ -307,4 +314,25 @@ fn a_dead_card_is_told_and_not_waited_for() {
 #[should_panic(expected = "is not in the picture")]
 fn a_column_beyond_the_page_is_refused() {
     PlanarBuffer::new().column(0, 200, 41, |column| column.fill(|| 0));
+}
+
+#[test]
+fn pixels_come_back_from_their_planes_and_nothing_is_stored() {
+    let mut card = ModeX::set(Recorder::new(), &[[0; 3]; 256]).unwrap();
+    let recorder = card.bus();
+    for (plane, bytes) in recorder.planes.iter_mut().enumerate() {
+        for (at, byte) in bytes.iter_mut().enumerate() {
+            *byte = (4 * at + plane) as u8;
+        }
+    }
+    recorder.log.clear();
+    // Across the end of the planes.
+    let mut pixels = [0; 24];
+    card.load(0xFFFE, &mut pixels);
+    let expected: Vec<u8> = (0..24).map(|i| (4 * 0xFFFE + i) as u8).collect();
+    assert_eq!(pixels[..], expected);
+    let recorder = card.bus();
+    assert_eq!(recorder.registers[&(GRAPHICS, READ_MAP)], 0);
+    let loads = recorder.log.iter().filter(|a| matches!(a, Access::Load(_)));
+    assert_eq!((loads.count(), recorder.log.len()), (24, 24 + 5));
 }

@@ -48,7 +48,7 @@ pub fn paint_ball(texels: &mut [u8; TEXELS]) -> Texture<'_> {
 }
 
 /// The ball before its background. `textures` holds what [`paint_ball`] painted.
-pub fn ball<'a>(textures: &'a [Texture<'a>]) -> Scene<'a> {
+pub fn ball<'t>(textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
     const _: () = assert!(BACKGROUND.len() == HEIGHT);
     Scene {
         name: "ball",

@@ -15,7 +15,7 @@ pub struct Pose {
     pub pitch: u32,
     /// About the line of sight, applied last: leans the axis to the side.
     pub roll: u32,
-    /// From the eye to the solid's centre, 16.16; positive, at most 2^23 (128 units).
+    /// From the eye to the solid's centre, 16.16; 0 to [`Pose::MAX_DISTANCE`].
     pub distance: i32,
 }
 
@@ -23,6 +23,9 @@ pub struct Pose {
 const DEGREE: u32 = ((1u64 << 32) / 360) as u32;
 
 impl Pose {
+    /// 128 units, 16.16.
+    pub const MAX_DISTANCE: i32 = 128 << 16;
+
     /// Ticks of a whole turn: 12 s.
     const TURN: u32 = 720;
 

@@ -16,18 +16,20 @@ pub const SURFACE_BYTES: usize = 1 << 20;
 const MAX_TEXTURES: usize = 8;
 
 /// What is seen: a solid, what covers it, and the colours of everything.
+///
+/// `'t` is the textures' life: a stage makes its own lit copies and needs them no longer.
 #[derive(Clone, Copy, Debug)]
-pub struct Scene<'a> {
+pub struct Scene<'a, 't> {
     /// Name, for people.
     pub name: &'static str,
     /// The solid, about the origin.
     pub mesh: Mesh<'a>,
     /// Textures in full light.
-    pub textures: &'a [Texture<'a>],
+    pub textures: &'t [Texture<'t>],
     /// The DAC's colours.
     pub palette: &'a Palette,
     /// What a colour becomes at a light level.
-    pub light: &'a LightTable,
+    pub light: &'t LightTable,
     /// The colour of each scan line where there is no solid.
     pub background: &'a [u8; HEIGHT],
 }
@@ -64,7 +66,10 @@ impl Default for Storage {
 /// takes the copy that fits: the mapper's loop knows nothing of light.
 #[derive(Debug)]
 pub struct Stage<'a> {
-    scene: Scene<'a>,
+    name: &'static str,
+    mesh: Mesh<'a>,
+    palette: &'a Palette,
+    background: &'a [u8; HEIGHT],
     /// `surfaces[texture * LIGHT_LEVELS + level]`.
     surfaces: [Texture<'a>; MAX_TEXTURES * LIGHT_LEVELS],
     points: &'a mut [Option<(i32, i32)>; MAX_VERTICES],
@@ -77,7 +82,7 @@ impl<'a> Stage<'a> {
     /// # Panics
     /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or textures
     /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together.
-    pub fn new(storage: &'a mut Storage, scene: Scene<'a>) -> Self {
+    pub fn new(storage: &'a mut Storage, scene: Scene<'a, '_>) -> Self {
         assert!(
             scene.mesh.vertices.len() <= MAX_VERTICES && scene.textures.len() <= MAX_TEXTURES,
             "the scene has {} vertices and {} textures; the arenas hold {MAX_VERTICES} and {MAX_TEXTURES}",
@@ -90,7 +95,7 @@ impl<'a> Stage<'a> {
             jobs,
         } = storage;
         let mut free = &mut arena[..];
-        let mut surfaces = [scene.textures[0]; MAX_TEXTURES * LIGHT_LEVELS];
+        let mut surfaces = [Texture::DOT; MAX_TEXTURES * LIGHT_LEVELS];
         for (texture, surfaces) in scene
             .textures
             .iter()
@@ -109,21 +114,34 @@ impl<'a> Stage<'a> {
             }
         }
         Self {
-            scene,
+            name: scene.name,
+            mesh: scene.mesh,
+            palette: scene.palette,
+            background: scene.background,
             surfaces,
             points,
             jobs,
         }
     }
 
-    /// The scene on the stage.
-    pub fn scene(&self) -> &Scene<'a> {
-        &self.scene
+    /// The scene's name.
+    pub fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// The DAC's colours.
+    pub fn palette(&self) -> &'a Palette {
+        self.palette
+    }
+
+    /// The colour of each scan line where there is no solid.
+    pub fn background(&self) -> &'a [u8; HEIGHT] {
+        self.background
     }
 
     /// Draws the solid in `pose` on a destination that holds the background.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
-        let mesh = &self.scene.mesh;
+        let mesh = &self.mesh;
         let orientation = pose.orientation();
         for (point, &vertex) in self.points.iter_mut().zip(mesh.vertices) {
             let [x, y, z] = orientation.turn(vertex);

@@ -16,12 +16,6 @@ const COM1: u16 = 0x3F8;
 /// The port, once it was found.
 static SERIAL: Mutex<Option<Uart16550<PioBackend>>> = Mutex::new(None);
 
-/// Writes a framed line to the serial line, with `format!`'s arguments.
-#[macro_export]
-macro_rules! line {
-    ($($text:tt)*) => { $crate::machine::serial::line(format_args!($($text)*)) };
-}
-
 /// Finds and sets up the port. A machine without one runs all the same, and says nothing.
 ///
 /// Set: 115 200 baud, 8-N-1, FIFO on, an interrupt for each byte received, which wakes the

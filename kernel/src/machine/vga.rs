@@ -57,6 +57,13 @@ impl Bus for Window {
         unsafe { place.write_volatile(bytes) }
     }
 
+    fn load8(&mut self, at: u16) -> u8 {
+        // SAFETY: any offset of 16 bits is inside the window.
+        let place = unsafe { self.base.add(usize::from(at)) };
+        // SAFETY: inside the window; a load from the card fills its latches and no RAM.
+        unsafe { place.read_volatile() }
+    }
+
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
         let end = usize::from(at) + usize::from(len.saturating_sub(1)) * STRIDE;
         assert!(

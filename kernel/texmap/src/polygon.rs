@@ -73,6 +73,12 @@ impl core::error::Error for TextureError {}
 impl<'a> Texture<'a> {
     /// Longest side in texels.
     pub const MAX_SIDE: u16 = 256;
+    /// The smallest texture: one texel of colour 0.
+    pub const DOT: Texture<'static> = Texture {
+        texels: &[0],
+        width: 1,
+        height: 1,
+    };
 
     /// A texture of `width` x `height` texels.
     ///

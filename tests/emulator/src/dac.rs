@@ -7,8 +7,10 @@ use crate::fault::Complaint;
 pub(crate) struct Dac {
     colours: [[Option<u8>; 3]; 256],
     pel_mask: Option<u8>,
-    /// Entry and part of the next data write.
+    /// Entry and part of the next data write; the chip has one address for both ways.
     write: Option<(u8, usize)>,
+    /// Entry and part of the next data read.
+    read: Option<(u8, usize)>,
 }
 
 impl Default for Dac {
@@ -17,6 +19,7 @@ impl Default for Dac {
             colours: [[None; 3]; 256],
             pel_mask: None,
             write: None,
+            read: None,
         }
     }
 }
@@ -35,22 +38,33 @@ impl Dac {
     }
 
     pub fn start_writing(&mut self, entry: u8) {
-        self.write = Some((entry, 0));
+        (self.write, self.read) = (Some((entry, 0)), None);
+    }
+
+    pub fn start_reading(&mut self, entry: u8) {
+        (self.write, self.read) = (None, Some((entry, 0)));
+    }
+
+    pub fn read_data(&mut self) -> Result<u8, Complaint> {
+        let Some((entry, part)) = self.read else {
+            let state = "the last PEL Address was not written to 3C7h".into();
+            return Err(("DAC is not in read mode", state));
+        };
+        self.read = Some(next(entry, part));
+        self.colours[usize::from(entry)][part]
+            .ok_or(("colour was never written", format!("DAC entry {entry}")))
     }
 
     pub fn write_data(&mut self, value: u8) -> Result<(), Complaint> {
         let Some((entry, part)) = self.write else {
             return Err((
-                "DAC entry is unknown",
-                "PEL Address was never written".into(),
+                "DAC is not in write mode",
+                "the last PEL Address was not written to 3C8h".into(),
             ));
         };
         // Only six bits are wired; QEMU keeps eight.
         self.colours[usize::from(entry)][part] = Some(value & 0x3F);
-        self.write = Some(match part {
-            2 => (entry.wrapping_add(1), 0),
-            _ => (entry, part + 1),
-        });
+        self.write = Some(next(entry, part));
         match value {
             0..=0x3F => Ok(()),
             _ => Err(("DAC value is wider than 6 bits", format!("{value:02X}h"))),
@@ -69,5 +83,13 @@ impl Dac {
                 format!("DAC entry {}", index & mask),
             )),
         }
+    }
+}
+
+/// The address steps after the third part.
+fn next(entry: u8, part: usize) -> (u8, usize) {
+    match part {
+        2 => (entry.wrapping_add(1), 0),
+        _ => (entry, part + 1),
     }
 }

@@ -225,14 +225,6 @@ impl Vga {
         self.memory.store(at, value, self.sequencer.map_mask());
     }
 
-    /// Loads a byte through the window.
-    pub fn load(&mut self, at: u16) -> u8 {
-        self.begin(Access::Load(at));
-        let outcome = self.check_memory(at);
-        self.note(Access::Load(at), outcome);
-        self.memory.load(at, self.graphics.read_map())
-    }
-
     /// A register read that finds nothing known.
     fn known(&mut self, access: Access, value: Option<u8>, what: &str) -> u8 {
         if value.is_none() {
@@ -277,6 +269,10 @@ impl Bus for Vga {
             ATTRIBUTE => self.attribute.write(value),
             MISC_WRITE => self.write_misc(value),
             PEL_MASK => self.dac.write_pel_mask(value),
+            PEL_READ => {
+                self.dac.start_reading(value);
+                Ok(())
+            }
             PEL_WRITE => {
                 self.dac.start_writing(value);
                 Ok(())
@@ -338,6 +334,13 @@ impl Bus for Vga {
                 };
             }
             MISC_READ => (self.misc, "Miscellaneous Output".to_owned()),
+            PEL_DATA => match self.dac.read_data() {
+                Ok(value) => return value,
+                Err(complaint) => {
+                    self.note(access, Err(complaint));
+                    return 0xFF;
+                }
+            },
             PEL_MASK => (self.dac.pel_mask(), "PEL Mask".to_owned()),
             ATTRIBUTE_READ => (self.attribute.read(), "attribute controller".to_owned()),
             port if [SEQUENCER, GRAPHICS, CRTC].contains(&port.wrapping_sub(1)) => {
@@ -377,6 +380,13 @@ impl Bus for Vga {
         for (i, byte) in (0..).zip(bytes.to_le_bytes()) {
             self.store(at.wrapping_add(i), byte);
         }
+    }
+
+    fn load8(&mut self, at: u16) -> u8 {
+        self.begin(Access::Load(at));
+        let outcome = self.check_memory(at);
+        self.note(Access::Load(at), outcome);
+        self.memory.load(at, self.graphics.read_map())
     }
 
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {

@@ -137,7 +137,10 @@ fn what_a_fresh_card_does_not_take() {
         ["Miscellaneous Output changed without reset"]
     );
     assert_eq!(after(&|v| v.out8(ATTRIBUTE, 0)), ["flip-flop is unknown"]);
-    assert_eq!(after(&|v| v.out8(PEL_DATA, 0)), ["DAC entry is unknown"]);
+    assert_eq!(
+        after(&|v| v.out8(PEL_DATA, 0)),
+        ["DAC is not in write mode"]
+    );
     // The BIOS leaves the protection on.
     assert_eq!(
         after(&|v| v.out16(CRTC, word(0, 0x5F))),
@@ -214,7 +217,7 @@ fn a_load_fills_the_latches_and_a_peek_does_not() {
     }
     for plane in 0..4 {
         vga.out16(GRAPHICS, word(4, plane));
-        assert_eq!(vga.load(0x5000), 10 + plane);
+        assert_eq!(vga.load8(0x5000), 10 + plane);
         assert_eq!(vga.peek(usize::from(plane), 0x5000), 10 + plane);
     }
 }

@@ -1,0 +1,384 @@
+//! Dumps: what a card holds, as text that `diff` can compare.
+//!
+//! ```text
+//! crystal-ball dump 1
+//! content page
+//! scene ball
+//! picture 480
+//! start 4b00
+//! size 320 240
+//! palette 00 000000 2a1c0f ...     16 lines of 16 colours, 6 bits a part: 00 to 3f
+//! line 000 6b6b6b6b ...            a line for each scan line, two hex digits a pixel
+//! end 262 lines 5d41402a
+//! ```
+//!
+//! Each of them is a line of the protocol, so it ends in its own checksum. The last one counts the
+//! lines before it and has the CRC-32 of them all, each taken without its own checksum and with
+//! an LF. What a terminal does to line ends changes none of it.
+//!
+//! With `content memory` the lines are `memory 4b00 6b6b ...`: all four planes, 80 addresses a
+//! line, so that a line of a page is a line of the dump. Pixel i of a line is in plane i & 3 at
+//! the line's address plus i / 4; the last line holds the sixteen addresses that are left over.
+//!
+//! Two dumps of the same picture on different pages differ in their `start` alone.
+
+use core::fmt;
+
+use crate::{Checksum, Content, Picture};
+
+/// Version of the format, in a dump's first line.
+pub const VERSION: u32 = 1;
+/// How a dump's first line begins; the version follows.
+pub const MAGIC: &str = "crystal-ball dump";
+/// Addresses of each plane.
+pub const PLANE_BYTES: usize = 0x1_0000;
+/// Colours on a line of the palette.
+pub const COLOURS_A_LINE: usize = 16;
+/// Widest picture whose lines fit [`crate::MAX_LINE`].
+pub const MAX_WIDTH: usize = 320;
+
+/// What the card's bytes are, at the head of a dump.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header<S> {
+    /// How much is in it.
+    pub content: Content,
+    /// The scene's name, a word.
+    pub scene: S,
+    /// What is on the screen; nothing before the first picture.
+    pub picture: Option<Picture>,
+    /// The start address: where the page on the screen begins in each plane.
+    pub start: u16,
+    /// Pixels in a line, a multiple of 4, at most [`MAX_WIDTH`].
+    pub width: u16,
+    /// Lines of a page.
+    pub height: u16,
+}
+
+/// A row of a dump: its label and where its pixels are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// What the row is of.
+    pub content: Content,
+    /// For a page the number of the scan line, for memory the address.
+    pub label: usize,
+    /// Address of its first four pixels.
+    pub at: u16,
+    /// Pixels in it.
+    pub pixels: usize,
+}
+
+impl fmt::Display for Row {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.content {
+            Content::Page => write!(f, "line {:03}", self.label),
+            Content::Memory => write!(f, "memory {:04x}", self.label),
+        }
+    }
+}
+
+impl<S> Header<S> {
+    /// The rows of the dump, in their order.
+    pub fn rows(&self) -> impl Iterator<Item = Row> + use<S> {
+        let (content, start) = (self.content, self.start);
+        let stride = usize::from(self.width / 4).max(1);
+        let rows = match content {
+            Content::Page => usize::from(self.height),
+            Content::Memory => PLANE_BYTES.div_ceil(stride),
+        };
+        (0..rows).map(move |row| {
+            let offset = row * stride;
+            match content {
+                Content::Page => Row {
+                    content,
+                    label: row,
+                    // The card's address counter wraps, too.
+                    at: start.wrapping_add(offset as u16),
+                    pixels: 4 * stride,
+                },
+                Content::Memory => Row {
+                    content,
+                    label: offset,
+                    at: offset as u16,
+                    pixels: 4 * stride.min(PLANE_BYTES - offset),
+                },
+            }
+        })
+    }
+}
+
+/// The CRC-32 over a dump's lines.
+#[derive(Clone, Debug, Default)]
+pub struct Whole {
+    checksum: Checksum,
+    lines: usize,
+}
+
+impl Whole {
+    /// Takes a line's text in.
+    pub fn add(&mut self, line: fmt::Arguments<'_>) {
+        struct Into<'a>(&'a mut Checksum);
+        impl fmt::Write for Into<'_> {
+            fn write_str(&mut self, text: &str) -> fmt::Result {
+                self.0.add(text.as_bytes());
+                Ok(())
+            }
+        }
+        // Neither the writer nor what is written here fails.
+        let _ = fmt::write(&mut Into(&mut self.checksum), line);
+        self.checksum.add(b"\n");
+        self.lines += 1;
+    }
+}
+
+/// The dump's last line.
+impl fmt::Display for Whole {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "end {} lines {:08x}", self.lines, self.checksum.value())
+    }
+}
+
+/// Writes a dump, a line at a time. `load` fills a slice with the pixels from an address on:
+/// pixel i is in plane i & 3 at the address plus i / 4.
+///
+/// # Panics
+/// If the header's width is more than [`MAX_WIDTH`].
+pub fn write<S: fmt::Display>(
+    header: &Header<S>,
+    palette: &[[u8; 3]; 256],
+    mut load: impl FnMut(u16, &mut [u8]),
+    mut line: impl FnMut(fmt::Arguments<'_>),
+) {
+    let mut whole = Whole::default();
+    let mut put = |text: fmt::Arguments<'_>| {
+        whole.add(text);
+        line(text);
+    };
+    let Header {
+        content,
+        scene,
+        picture,
+        start,
+        width,
+        height,
+    } = header;
+    put(format_args!("{MAGIC} {VERSION}"));
+    put(format_args!("content {content}"));
+    put(format_args!("scene {scene}"));
+    match picture {
+        Some(picture) => put(format_args!("picture {picture}")),
+        None => put(format_args!("picture none")),
+    }
+    put(format_args!("start {start:04x}"));
+    put(format_args!("size {width} {height}"));
+    for (i, colours) in palette.chunks(COLOURS_A_LINE).enumerate() {
+        let first = i * COLOURS_A_LINE;
+        put(format_args!("palette {first:02x}{}", Colours(colours)));
+    }
+    let mut pixels = [0; MAX_WIDTH];
+    for row in header.rows() {
+        let pixels = &mut pixels[..row.pixels];
+        load(row.at, pixels);
+        put(format_args!("{row} {}", Hex(pixels)));
+    }
+    line(format_args!("{whole}"));
+}
+
+impl fmt::Display for Content {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Page => "page",
+            Self::Memory => "memory",
+        })
+    }
+}
+
+struct Colours<'a>(&'a [[u8; 3]]);
+
+impl fmt::Display for Colours<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0
+            .iter()
+            .try_for_each(|part| write!(f, " {}", Hex(part)))
+    }
+}
+
+/// Bytes in hex, nothing between them.
+struct Hex<'a>(&'a [u8]);
+
+impl fmt::Display for Hex<'_> {
+    /// A chunk at a time: a write for each byte takes most of a dump's time.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const DIGITS: &[u8; 16] = b"0123456789abcdef";
+        for bytes in self.0.chunks(32) {
+            let mut digits = [0; 64];
+            for (pair, &byte) in digits.chunks_exact_mut(2).zip(bytes) {
+                pair[0] = DIGITS[usize::from(byte >> 4)];
+                pair[1] = DIGITS[usize::from(byte & 15)];
+            }
+            let digits = &digits[..2 * bytes.len()];
+            f.write_str(core::str::from_utf8(digits).map_err(|_| fmt::Error)?)?;
+        }
+        Ok(())
+    }
+}
+
+/// Writes the checksums that stand for a dump: of the pixels of the page on the screen, line by
+/// line; of the palette; and with `content memory` of each plane.
+///
+/// ```text
+/// page start 4b00 crc 0a0b0c0d
+/// palette crc 0a0b0c0d
+/// plane 0 crc 0a0b0c0d          and three more
+/// ```
+///
+/// # Panics
+/// As [`write`].
+pub fn write_checksums<S: Copy>(
+    header: &Header<S>,
+    palette: &[[u8; 3]; 256],
+    mut load: impl FnMut(u16, &mut [u8]),
+    mut line: impl FnMut(fmt::Arguments<'_>),
+) {
+    let mut buffer = [0; MAX_WIDTH];
+    let mut page = Checksum::new();
+    let content = Content::Page;
+    for row in (Header { content, ..*header }).rows() {
+        load(row.at, &mut buffer[..row.pixels]);
+        page.add(&buffer[..row.pixels]);
+    }
+    line(format_args!(
+        "page start {:04x} crc {:08x}",
+        header.start,
+        page.value()
+    ));
+    let mut colours = Checksum::new();
+    colours.add(palette.as_flattened());
+    line(format_args!("palette crc {:08x}", colours.value()));
+    if header.content == Content::Page {
+        return;
+    }
+    let mut planes = [(); 4].map(|()| Checksum::new());
+    for row in header.rows() {
+        load(row.at, &mut buffer[..row.pixels]);
+        for (plane, checksum) in planes.iter_mut().enumerate() {
+            let mut bytes = [0; MAX_WIDTH / 4];
+            let of_plane = buffer[..row.pixels].iter().skip(plane).step_by(4);
+            for (byte, &pixel) in bytes.iter_mut().zip(of_plane) {
+                *byte = pixel;
+            }
+            checksum.add(&bytes[..row.pixels / 4]);
+        }
+    }
+    for (plane, checksum) in planes.iter().enumerate() {
+        line(format_args!("plane {plane} crc {:08x}", checksum.value()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::string::{String, ToString};
+    use std::vec::Vec;
+
+    fn header(content: Content) -> Header<&'static str> {
+        Header {
+            content,
+            scene: "ball",
+            picture: Some(Picture::Frame(u32::MAX)),
+            start: 0x4B00,
+            width: 320,
+            height: 240,
+        }
+    }
+
+    fn lines(content: Content) -> Vec<String> {
+        let mut lines = Vec::new();
+        write(
+            &header(content),
+            &[[0x3F, 0, 1]; 256],
+            |at, pixels| pixels.fill(at as u8),
+            |line| lines.push(line.to_string()),
+        );
+        lines
+    }
+
+    #[test]
+    fn every_line_fits_and_is_labelled() {
+        for (content, rows, last) in [
+            (Content::Page, 240, "line 239 "),
+            (Content::Memory, 820, "memory fff0 "),
+        ] {
+            let lines = lines(content);
+            assert_eq!(lines.len(), 6 + 16 + rows + 1);
+            assert_eq!(lines[0], "crystal-ball dump 1");
+            assert_eq!(lines[3], "picture 4294967295");
+            assert!(lines[21].starts_with("palette f0 3f0001 3f0001"));
+            assert!(lines[rows + 21].starts_with(last), "{}", lines[rows + 21]);
+            assert!(lines[rows + 22].starts_with(&std::format!("end {} lines ", rows + 22)));
+            for line in &lines {
+                let mut sent = Vec::new();
+                crate::write_line(format_args!("{line}"), |bytes| {
+                    sent.extend_from_slice(bytes)
+                });
+                let sent = String::from_utf8(sent).unwrap();
+                assert_eq!(
+                    crate::unframe(sent.trim_end()),
+                    Ok(line.as_str()),
+                    "it was cut"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn rows_cover_the_planes_once() {
+        let mut seen = std::vec![0; 4 * PLANE_BYTES];
+        for row in header(Content::Memory).rows() {
+            for i in 0..row.pixels {
+                seen[4 * usize::from(row.at) + i] += 1;
+            }
+        }
+        assert!(seen.iter().all(|&times| times == 1));
+        let wrapped = Header {
+            start: 0xFFF0,
+            ..header(Content::Page)
+        };
+        assert_eq!(wrapped.rows().nth(1).unwrap().at, 0x0040);
+    }
+
+    #[test]
+    fn checksums_are_those_of_the_bytes() {
+        let mut lines = Vec::new();
+        let mut addresses = 0;
+        write_checksums(
+            &header(Content::Memory),
+            &[[1, 2, 3]; 256],
+            |_, pixels| {
+                addresses += pixels.len() / 4;
+                for (i, pixel) in pixels.iter_mut().enumerate() {
+                    *pixel = i as u8 & 3;
+                }
+            },
+            |line| lines.push(line.to_string()),
+        );
+        assert_eq!(addresses, 240 * 80 + PLANE_BYTES);
+        let crc = |bytes: &[u8]| {
+            let mut checksum = Checksum::new();
+            checksum.add(bytes);
+            std::format!("{:08x}", checksum.value())
+        };
+        assert_eq!(
+            lines[0],
+            std::format!("page start 4b00 crc {}", crc(&[0, 1, 2, 3].repeat(19_200)))
+        );
+        assert_eq!(
+            lines[1],
+            std::format!("palette crc {}", crc(&[1, 2, 3].repeat(256)))
+        );
+        for plane in 0..4 {
+            let crc = crc(&std::vec![plane as u8; PLANE_BYTES]);
+            assert_eq!(lines[2 + plane], std::format!("plane {plane} crc {crc}"));
+        }
+    }
+}

@@ -1,0 +1,312 @@
+//! The program: pictures, one after the other, and answers to commands.
+//!
+//! Running, it draws the picture of each tick as long as the machine keeps up, and skips ticks
+//! when it does not: the motion keeps its pace. Held, it draws what `show` names and touches no
+//! video memory between commands, so that what is on the screen can be taken as evidence.
+//!
+//! It knows nothing of the machine: a card behind a [`modex::Bus`], bytes in, lines out, and the
+//! tick as an argument. The kernel gives it the bare machine's card and its serial line, a test
+//! the emulated card and a list; the same commands then bring the same answers.
+#![no_std]
+#![forbid(unsafe_code)]
+
+use core::fmt;
+
+use link::dump::{self, Header};
+use link::{Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING};
+use modex::{Bus, Counted, HEIGHT, ModeX, Readback, Tally, WIDTH};
+use scene::{Pose, Stage, Storage, TEXELS};
+use texmap::Stats;
+
+/// The program's version, as its first line and `version` tell it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Where an answer's lines go, each without its checksum.
+pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
+
+/// The fixed memory of the program. About 1.2 MiB: meant for a static.
+#[derive(Debug)]
+pub struct Memory {
+    texels: [u8; TEXELS],
+    storage: Storage,
+}
+
+impl Memory {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            texels: [0; TEXELS],
+            storage: Storage::new(),
+        }
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What only the machine can do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Request {
+    /// Break in this way.
+    Fail(Fault),
+    /// End, as asked to.
+    Leave,
+}
+
+/// How the running show keeps up with the ticks.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pace {
+    /// The tick of the last picture.
+    last: Option<u32>,
+    /// Pictures shown.
+    pictures: u32,
+    /// Pictures that came more than a tick after the one before.
+    late: u32,
+}
+
+/// A card, and the scene that is shown on it.
+#[derive(Debug)]
+pub struct Show<'a, B> {
+    card: ModeX<Counted<B>>,
+    stage: Stage<'a>,
+    lines: Lines,
+    /// The last picture, and what it took.
+    picture: Option<Picture>,
+    drawn: Stats,
+    /// Nothing while the show is held.
+    pace: Option<Pace>,
+}
+
+impl<'a, B: Bus> Show<'a, B> {
+    /// Paints the scene into `memory` and sets the card's mode. The show runs.
+    ///
+    /// # Panics
+    /// If the card does not read back as it was set: it can't be drawn on.
+    pub fn new(memory: &'a mut Memory, bus: B) -> Self {
+        let textures = [scene::paint_ball(&mut memory.texels)];
+        let stage = Stage::new(&mut memory.storage, scene::ball(&textures));
+        Self {
+            card: set(ModeX::set(Counted::new(bus), stage.palette())),
+            stage,
+            lines: Lines::new(),
+            picture: None,
+            drawn: Stats::default(),
+            pace: Some(Pace::default()),
+        }
+    }
+
+    /// The card.
+    pub fn bus(&mut self) -> &mut B {
+        self.card.bus().inner()
+    }
+
+    /// Whether the show runs and the picture of `tick` is not on the screen yet.
+    pub fn is_due(&self, tick: u32) -> bool {
+        self.pace.is_some_and(|pace| pace.last != Some(tick))
+    }
+
+    /// Shows the running show's picture of `tick`.
+    pub fn present(&mut self, tick: u32, out: &mut Out<'_>) {
+        self.draw(Picture::Frame(tick), &Pose::at_tick(tick));
+        let Some(pace) = &mut self.pace else { return };
+        let before = pace.last.replace(tick);
+        pace.late += u32::from(before.is_some_and(|before| tick.wrapping_sub(before) > 1));
+        pace.pictures = pace.pictures.wrapping_add(1);
+        if before.is_none() {
+            out(format_args!("{RUNNING}"));
+        }
+    }
+
+    /// Takes a byte of the serial line; with the one that ends a line, obeys it.
+    pub fn receive(&mut self, byte: u8, tick: u32, out: &mut Out<'_>) -> Option<Request> {
+        let command = match self.lines.push(byte)? {
+            Ok(line) => Command::parse(line),
+            Err(noise) => {
+                out(format_args!("{ERROR} {noise}"));
+                return None;
+            }
+        };
+        match command {
+            Ok(command) => self.obey(command, tick, out),
+            Err(error) => {
+                out(format_args!("{ERROR} {error}"));
+                None
+            }
+        }
+    }
+
+    /// Carries a command out and answers it.
+    pub fn obey(&mut self, command: Command, tick: u32, out: &mut Out<'_>) -> Option<Request> {
+        match command {
+            Command::Hold => self.hold(),
+            Command::Run => self.pace = Some(Pace::default()),
+            Command::Show(picture) => {
+                let Some(pose) = pose(picture) else {
+                    let most = Pose::MAX_DISTANCE;
+                    out(format_args!("{ERROR} a distance is 0 to {most:08x}"));
+                    return None;
+                };
+                if self.pace.is_some() {
+                    self.hold();
+                }
+                self.draw(picture, &pose);
+                self.card.settle();
+                out(format_args!("page {}", self.card.shown_page()));
+            }
+            Command::Dump(content) => {
+                let (header, palette) = (self.header(content), self.card.palette());
+                dump::write(
+                    &header,
+                    &palette,
+                    |at, row| self.card.load(at, row),
+                    &mut *out,
+                );
+            }
+            Command::Checksums(content) => {
+                let (header, palette) = (self.header(content), self.card.palette());
+                dump::write_checksums(
+                    &header,
+                    &palette,
+                    |at, row| self.card.load(at, row),
+                    &mut *out,
+                );
+            }
+            Command::Registers => self.tell_registers(out),
+            Command::Counts => self.tell_counts(tick, out),
+            Command::State => self.tell_state(tick, out),
+            Command::Version => out(format_args!(
+                "crystal-ball {VERSION} protocol {PROTOCOL} dump {}",
+                dump::VERSION
+            )),
+            Command::Fail(fault) => return Some(Request::Fail(fault)),
+            Command::Leave => {}
+        }
+        out(format_args!("{OK} {command}"));
+        (command == Command::Leave).then_some(Request::Leave)
+    }
+
+    /// Draws a picture on the next page, and flips.
+    fn draw(&mut self, picture: Picture, pose: &Pose) {
+        self.card.bus().take_counts();
+        let mut canvas = self.card.begin(self.stage.background());
+        self.drawn = self.stage.draw(pose, &mut canvas);
+        self.card.flip();
+        self.picture = Some(picture);
+    }
+
+    /// Stops the show, the card as after the mode set: what follows depends on the commands
+    /// alone, and not on how far the show had come.
+    fn hold(&mut self) {
+        self.pace = None;
+        self.picture = None;
+        set(self.card.reset(self.stage.palette()));
+    }
+
+    fn header(&self, content: Content) -> Header<&'static str> {
+        Header {
+            content,
+            scene: self.stage.name(),
+            picture: self.picture,
+            start: self.card.start_address(),
+            width: WIDTH as u16,
+            height: HEIGHT as u16,
+        }
+    }
+
+    fn tell_registers(&mut self, out: &mut Out<'_>) {
+        let mode = self.card.registers();
+        for (block, registers) in mode.blocks() {
+            out(format_args!("{block} {}", Bytes(registers)));
+        }
+    }
+
+    fn tell_counts(&mut self, tick: u32, out: &mut Out<'_>) {
+        let Stats {
+            polygons,
+            columns,
+            pixels,
+            dropped,
+            full,
+        } = self.drawn;
+        out(format_args!(
+            "picture polygons {polygons} columns {columns} pixels {pixels} dropped {dropped} full {full}"
+        ));
+        for (purpose, tally) in self.card.bus().counts().named() {
+            let Tally {
+                ports,
+                map_mask,
+                stores,
+                bytes,
+            } = tally;
+            out(format_args!(
+                "{purpose} ports {ports} map-mask {map_mask} stores {stores} bytes {bytes}"
+            ));
+        }
+        if let Some(Pace { pictures, late, .. }) = self.pace {
+            out(format_args!(
+                "pace pictures {pictures} late {late} tick {tick}"
+            ));
+        }
+    }
+
+    fn tell_state(&mut self, tick: u32, out: &mut Out<'_>) {
+        match self.pace {
+            Some(_) => out(format_args!("running tick {tick}")),
+            None => out(format_args!("held")),
+        }
+        out(format_args!("scene {}", self.stage.name()));
+        match self.picture {
+            Some(picture) => out(format_args!("picture {picture}")),
+            None => out(format_args!("picture none")),
+        }
+        out(format_args!(
+            "page {} start {:04x}",
+            self.card.shown_page(),
+            self.card.start_address()
+        ));
+    }
+}
+
+/// The pose of a picture; none if it is outside the legal range.
+fn pose(picture: Picture) -> Option<Pose> {
+    match picture {
+        Picture::Frame(frame) => Some(Pose::at_tick(frame)),
+        Picture::Pose {
+            yaw,
+            pitch,
+            roll,
+            distance,
+        } => {
+            let distance = i32::try_from(distance).ok()?;
+            (distance <= Pose::MAX_DISTANCE).then_some(Pose {
+                yaw,
+                pitch,
+                roll,
+                distance,
+            })
+        }
+    }
+}
+
+fn set<T>(outcome: Result<T, Readback>) -> T {
+    match outcome {
+        Ok(card) => card,
+        Err(readback) => panic!("Mode X is not set: {readback}"),
+    }
+}
+
+/// Bytes in hex, a space between.
+struct Bytes<'a>(&'a [u8]);
+
+impl fmt::Display for Bytes<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, byte) in self.0.iter().enumerate() {
+            let space = if i == 0 { "" } else { " " };
+            write!(f, "{space}{byte:02x}")?;
+        }
+        Ok(())
+    }
+}
