@@ -2,6 +2,8 @@
 
 pub mod aside;
 pub mod child;
+pub mod dump;
+pub mod indexed;
 pub mod machine;
 pub mod screen;
 pub mod setup;

@@ -1,0 +1,323 @@
+//! Dumps on the host: read, checked line by line, and written again.
+//!
+//! The format is `link::dump`'s. Nothing is taken on trust: each line has its checksum, its label
+//! is the one that is due, and the last line's count and checksum are those of the lines before.
+//! So a line that is missing, repeated, or in another's place is told by its number.
+
+use std::fmt;
+use std::io::{self, Write};
+
+use link::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
+use link::{Content, Lines, Picture};
+use modex::Palette;
+
+use crate::indexed::Indexed;
+
+/// What a card held: its palette and the pixels of a page, or of all video memory.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Dump {
+    /// What it is of.
+    pub header: Header<String>,
+    /// The DAC's colours, 6 bits a part.
+    pub palette: Palette,
+    /// The pixels of the rows, one after the other; of memory, pixel i is in plane i & 3 at i / 4.
+    pub pixels: Vec<u8>,
+}
+
+impl fmt::Debug for Dump {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a dump of {:?}", self.header)
+    }
+}
+
+/// Why a text is no dump.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NoDump {
+    /// The line, counted from 1.
+    pub line: usize,
+    /// What is wrong with it.
+    pub why: String,
+}
+
+impl fmt::Display for NoDump {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "line {}: {}", self.line, self.why)
+    }
+}
+
+impl std::error::Error for NoDump {}
+
+impl Dump {
+    /// Reads a dump from a file's bytes: lines with their checksums, ended by LF or CR LF.
+    ///
+    /// # Errors
+    /// The first line that is not as it must be.
+    pub fn read(bytes: &[u8]) -> Result<Self, NoDump> {
+        let (mut lines, mut texts) = (Lines::new(), Vec::new());
+        for &byte in bytes {
+            let Some(line) = lines.push(byte) else {
+                continue;
+            };
+            let text =
+                line.map_err(|noise| noise.to_string()).and_then(|line| {
+                    match link::unframe(line) {
+                        Ok(text) => Ok(text.to_string()),
+                        Err(error) => Err(error.to_string()),
+                    }
+                });
+            // Of something else altogether, say that it is no dump, and not what its bytes are.
+            let first = texts.is_empty();
+            texts.push(text.map_err(|why| NoDump {
+                line: texts.len() + 1,
+                why: if first { no_dump(&why) } else { why },
+            })?);
+        }
+        if !bytes.is_empty() && !bytes.ends_with(b"\n") {
+            return Err(NoDump {
+                line: texts.len() + 1,
+                why: match texts.is_empty() {
+                    true => no_dump("it has no end"),
+                    false => "it is cut short: the line has no end".into(),
+                },
+            });
+        }
+        Self::from_lines(&texts)
+    }
+
+    /// Reads a dump from its lines, their checksums checked and taken off.
+    ///
+    /// # Errors
+    /// As [`Dump::read`].
+    pub fn from_lines(lines: &[impl AsRef<str>]) -> Result<Self, NoDump> {
+        let mut reader = Reader {
+            lines: lines.iter().map(AsRef::as_ref).collect(),
+            read: 0,
+            whole: Whole::default(),
+        };
+        reader.dump().map_err(|why| NoDump {
+            line: reader.read.max(1),
+            why,
+        })
+    }
+
+    /// The dump as lines of text, without their checksums.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        self.write_lines(|line| lines.push(line.to_string()));
+        lines
+    }
+
+    /// Writes the dump as the kernel does, each line with its checksum.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn write(&self, mut to: impl Write) -> io::Result<()> {
+        let mut outcome = Ok(());
+        self.write_lines(|line| {
+            let mut framed = Vec::new();
+            link::write_line(line, |bytes| framed.extend_from_slice(bytes));
+            if outcome.is_ok() {
+                outcome = to.write_all(&framed);
+            }
+        });
+        outcome
+    }
+
+    fn write_lines(&self, line: impl FnMut(fmt::Arguments<'_>)) {
+        let mut rest = &self.pixels[..];
+        link::dump::write(
+            &self.header,
+            &self.palette,
+            |_, row| {
+                let (these, after) = rest.split_at(row.len());
+                row.copy_from_slice(these);
+                rest = after;
+            },
+            line,
+        );
+    }
+
+    /// The picture on the screen.
+    pub fn picture(&self) -> Indexed {
+        let Header { width, height, .. } = self.header;
+        let pixels = match self.header.content {
+            Content::Page => self.pixels.clone(),
+            Content::Memory => {
+                let page = Header {
+                    content: Content::Page,
+                    ..self.header.clone()
+                };
+                let row = |row: link::dump::Row| {
+                    (0..row.pixels).map(move |i| {
+                        let at = row.at.wrapping_add((i / 4) as u16);
+                        self.pixels[4 * usize::from(at) + i % 4]
+                    })
+                };
+                page.rows().flat_map(row).collect()
+            }
+        };
+        Indexed {
+            width: width.into(),
+            height: height.into(),
+            palette: self.palette.to_vec(),
+            pixels,
+        }
+    }
+}
+
+fn no_dump(why: &str) -> String {
+    format!("it is no dump: it does not begin with '{MAGIC} {VERSION}' ({why})")
+}
+
+/// Takes a dump's lines in, one by one.
+struct Reader<'a> {
+    lines: Vec<&'a str>,
+    read: usize,
+    whole: Whole,
+}
+
+impl<'a> Reader<'a> {
+    /// The rest of the next line, which must begin with `label`.
+    fn line(&mut self, label: &str) -> Result<&'a str, String> {
+        let found = self.lines.get(self.read).copied();
+        self.read += 1;
+        let Some(line) = found else {
+            return Err(format!("it is cut short: '{label}' should come here"));
+        };
+        let rest = line
+            .strip_prefix(label)
+            .and_then(|rest| rest.strip_prefix(' '));
+        let rest = rest.ok_or_else(|| {
+            let mut said: String = line.chars().take(label.len().max(12)).collect();
+            if said.len() < line.len() {
+                said += "...";
+            }
+            format!("'{said}' stands where '{label}' should")
+        })?;
+        self.whole.add(format_args!("{line}"));
+        Ok(rest)
+    }
+
+    fn dump(&mut self) -> Result<Dump, String> {
+        let version = self.line(MAGIC).map_err(|why| no_dump(&why))?;
+        if version != VERSION.to_string() {
+            return Err(format!(
+                "it is a dump of version {version}; this program reads version {VERSION}"
+            ));
+        }
+        let header = self.header()?;
+        let palette = self.palette()?;
+        let mut pixels = Vec::with_capacity(4 * PLANE_BYTES);
+        for row in header.rows() {
+            let digits = self.line(&row.to_string())?;
+            let before = pixels.len();
+            hex(digits, &mut pixels)?;
+            let there = pixels.len() - before;
+            if there != row.pixels {
+                return Err(format!("it has {there} pixels, not {}", row.pixels));
+            }
+        }
+        let end = self.whole.to_string();
+        let said = self.line("end")?;
+        if format!("end {said}") != end {
+            return Err(format!(
+                "it says 'end {said}', but the lines before it make '{end}'"
+            ));
+        }
+        if self.read < self.lines.len() {
+            self.read += 1;
+            return Err("there is more after the dump's end".into());
+        }
+        Ok(Dump {
+            header,
+            palette,
+            pixels,
+        })
+    }
+
+    fn header(&mut self) -> Result<Header<String>, String> {
+        let content = match self.line("content")? {
+            "page" => Content::Page,
+            "memory" => Content::Memory,
+            other => return Err(format!("content is 'page' or 'memory', not '{other}'")),
+        };
+        let scene = self.line("scene")?.to_string();
+        let picture = match self.line("picture")? {
+            "none" => None,
+            name => Some(
+                Picture::parse(name.split(' ')).ok_or_else(|| format!("'{name}' is no picture"))?,
+            ),
+        };
+        let mut start = Vec::new();
+        hex(self.line("start")?, &mut start)?;
+        let start: [u8; 2] = start
+            .try_into()
+            .map_err(|_| "a start address has four digits")?;
+        let size = self.line("size")?;
+        let sides = size.split_once(' ');
+        let sides = sides.and_then(|(w, h)| Some((w.parse::<u16>().ok()?, h.parse::<u16>().ok()?)));
+        let legal = |&(width, height): &(u16, u16)| {
+            let (width, height) = (usize::from(width), usize::from(height));
+            width > 0
+                && width % 4 == 0
+                && width <= MAX_WIDTH
+                && height > 0
+                && width / 4 * height <= PLANE_BYTES
+        };
+        let (width, height) = sides.filter(legal).ok_or_else(|| {
+            format!("'{size}' is no size: a width in fours up to {MAX_WIDTH}, and a height")
+        })?;
+        Ok(Header {
+            content,
+            scene,
+            picture,
+            start: u16::from_be_bytes(start),
+            width,
+            height,
+        })
+    }
+
+    fn palette(&mut self) -> Result<Palette, String> {
+        let mut parts = Vec::with_capacity(3 * 256);
+        for first in (0..256).step_by(COLOURS_A_LINE) {
+            let colours = self.line(&format!("palette {first:02x}"))?;
+            for colour in colours.split(' ') {
+                let before = parts.len();
+                hex(colour, &mut parts)?;
+                if parts.len() - before != 3 || parts[before..].iter().any(|&part| part > 0x3F) {
+                    return Err(format!("'{colour}' is no colour: three parts of 00 to 3f"));
+                }
+            }
+            let there = parts.len() / 3 - first;
+            if there != COLOURS_A_LINE {
+                return Err(format!("it has {there} colours, not {COLOURS_A_LINE}"));
+            }
+        }
+        let (colours, _) = parts.as_chunks::<3>();
+        colours
+            .try_into()
+            .map_err(|_| "a palette has 256 colours".into())
+    }
+}
+
+/// Appends the bytes that lower-case hex digits stand for.
+fn hex(digits: &str, bytes: &mut Vec<u8>) -> Result<(), String> {
+    let nibble = |digit: u8| match digit {
+        b'0'..=b'9' => Some(digit - b'0'),
+        b'a'..=b'f' => Some(digit - b'a' + 10),
+        _ => None,
+    };
+    for pair in digits.as_bytes().chunks(2) {
+        let byte = match *pair {
+            [high, low] => nibble(high)
+                .zip(nibble(low))
+                .map(|(high, low)| high << 4 | low),
+            _ => None,
+        };
+        bytes.push(byte.ok_or_else(|| {
+            let pair = String::from_utf8_lossy(pair);
+            format!("'{pair}' is no pair of digits 0 to 9 and a to f")
+        })?);
+    }
+    Ok(())
+}

@@ -1,0 +1,96 @@
+//! Pictures in palette indices, as a page holds them and as an indexed PNG keeps them.
+
+use std::fmt;
+use std::io::{BufRead, Seek, Write};
+
+use anyhow::{Context, bail};
+use modex::Rgb6;
+
+/// A picture whose pixels are indices into its palette.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Indexed {
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// Up to 256 colours, 6 bits a part.
+    pub palette: Vec<Rgb6>,
+    /// `width * height` indices, row by row, each of them in the palette.
+    pub pixels: Vec<u8>,
+}
+
+impl fmt::Debug for Indexed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a picture of {} x {}", self.width, self.height)
+    }
+}
+
+/// Six bits of a colour's part as eight, in the way of QEMU's DAC, so that a PNG and a screendump
+/// show the same colour.
+pub fn widen(part: u8) -> u8 {
+    (part << 2) | ((part & 1) * 3)
+}
+
+impl Indexed {
+    /// Writes an indexed PNG of 8 bits a pixel.
+    ///
+    /// # Errors
+    /// What the writer says.
+    pub fn write_png(&self, to: impl Write) -> anyhow::Result<()> {
+        let mut encoder = png::Encoder::new(to, self.width.try_into()?, self.height.try_into()?);
+        encoder.set_color(png::ColorType::Indexed);
+        encoder.set_depth(png::BitDepth::Eight);
+        let colours: Vec<u8> = self
+            .palette
+            .as_flattened()
+            .iter()
+            .map(|&p| widen(p))
+            .collect();
+        encoder.set_palette(colours);
+        let mut writer = encoder.write_header().context("the PNG's header")?;
+        writer.write_image_data(&self.pixels)?;
+        Ok(writer.finish()?)
+    }
+
+    /// Reads an indexed PNG of 8 bits a pixel.
+    ///
+    /// # Errors
+    /// Any other PNG, colours that six bits can't hold, an index outside the palette.
+    pub fn read_png(from: impl BufRead + Seek) -> anyhow::Result<Self> {
+        let mut reader = png::Decoder::new(from).read_info()?;
+        let info = reader.info();
+        let (width, height) = (info.width as usize, info.height as usize);
+        let (colour, depth) = (info.color_type, info.bit_depth);
+        let (png::ColorType::Indexed, png::BitDepth::Eight) = (colour, depth) else {
+            bail!("its pixels are {colour:?} of {depth:?} bits, not indices of eight");
+        };
+        let parts = info.palette.as_deref().context("it has no palette")?;
+        let mut palette = Vec::new();
+        for (entry, colour) in parts.as_chunks::<3>().0.iter().enumerate() {
+            if let Some(part) = colour.iter().find(|&&part| widen(part >> 2) != part) {
+                bail!("palette entry {entry:02x} has a part {part:02x}, which no 6 bits make");
+            }
+            palette.push(colour.map(|part| part >> 2));
+        }
+        let size = reader.output_buffer_size().context("it is too large")?;
+        let mut pixels = vec![0; size];
+        reader.next_frame(&mut pixels)?;
+        // A cut file may have all of its pixels, and no end.
+        reader.finish()?;
+        if let Some(at) = pixels.iter().position(|&p| usize::from(p) >= palette.len()) {
+            bail!(
+                "x {}, y {} has index {:02x}; the palette has {} colours",
+                at % width,
+                at / width,
+                pixels[at],
+                palette.len()
+            );
+        }
+        Ok(Self {
+            width,
+            height,
+            palette,
+            pixels,
+        })
+    }
+}
