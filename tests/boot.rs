@@ -13,6 +13,7 @@ use std::process::{Command as Process, Output, Stdio};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
+use crystal_ball::card::Card;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::screen::Screen;
 use crystal_ball::setup::{self, Options, Ready};
@@ -124,7 +125,7 @@ fn every_page_shows_what_the_emulated_card_shows() {
         let answer = machine.ask(Command::Show(Picture::Frame(*frame))).unwrap();
         assert_eq!(answer, [format!("page {}", (i + 1) % 3)]);
         assert_same(
-            &machine.screendump().unwrap(),
+            &machine.screen().unwrap(),
             picture,
             &format!("frame {frame}"),
         );
@@ -181,7 +182,7 @@ fn every_adapter_with_a_vga_core_shows_the_same() {
         machine
             .ask(Command::Show(Picture::Frame(480)))
             .expect(&what);
-        assert_same(&machine.screendump().unwrap(), &picture, &what);
+        assert_same(&machine.screen().unwrap(), &picture, &what);
         machine.leave().expect(&what);
     }
 }
@@ -248,10 +249,10 @@ fn the_running_show_paces_itself_and_can_be_held() {
 
     machine.ask(Command::Hold).unwrap();
     assert_eq!(pace(&mut machine), None);
-    let still = machine.screendump().unwrap();
+    let still = machine.screen().unwrap();
     machine.rest(Duration::from_millis(300)).unwrap();
     assert!(
-        still == machine.screendump().unwrap(),
+        still == machine.screen().unwrap(),
         "the held picture changed"
     );
     machine.ask(Command::Run).unwrap();

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use crystal_ball::card::Card;
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::setup::{self, Options};
 use link::{Command, Picture};

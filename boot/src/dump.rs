@@ -123,37 +123,56 @@ impl Dump {
         outcome
     }
 
+    /// The checksums that stand for the dump, as the kernel tells them.
+    pub fn checksums(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        link::dump::write_checksums(
+            &self.header,
+            &self.palette,
+            |at, row| self.load(at, row),
+            |line| lines.push(line.to_string()),
+        );
+        lines
+    }
+
+    /// Pixels from an address on, as the card would be read.
+    fn load(&self, at: u16, row: &mut [u8]) {
+        let first = match self.header.content {
+            Content::Page => at.wrapping_sub(self.header.start),
+            Content::Memory => at,
+        };
+        for (i, pixel) in row.iter_mut().enumerate() {
+            // Addresses are 16 bits wide: they wrap.
+            let address = first.wrapping_add((i / 4) as u16);
+            *pixel = self.pixels[4 * usize::from(address) + i % 4];
+        }
+    }
+
     fn write_lines(&self, line: impl FnMut(fmt::Arguments<'_>)) {
-        let mut rest = &self.pixels[..];
         link::dump::write(
             &self.header,
             &self.palette,
-            |_, row| {
-                let (these, after) = rest.split_at(row.len());
-                row.copy_from_slice(these);
-                rest = after;
-            },
+            |at, row| self.load(at, row),
             line,
         );
     }
 
     /// The picture on the screen.
     pub fn picture(&self) -> Indexed {
-        let Header { width, height, .. } = self.header;
+        let Header {
+            width,
+            height,
+            start,
+            ..
+        } = self.header;
         let pixels = match self.header.content {
             Content::Page => self.pixels.clone(),
             Content::Memory => {
-                let page = Header {
-                    content: Content::Page,
-                    ..self.header.clone()
-                };
-                let row = |row: link::dump::Row| {
-                    (0..row.pixels).map(move |i| {
-                        let at = row.at.wrapping_add((i / 4) as u16);
-                        self.pixels[4 * usize::from(at) + i % 4]
-                    })
-                };
-                page.rows().flat_map(row).collect()
+                let mut pixels = vec![0; usize::from(width) * usize::from(height)];
+                for (y, row) in (0..).zip(pixels.chunks_exact_mut(width.into())) {
+                    self.load(start.wrapping_add(y * (width / 4)), row);
+                }
+                pixels
             }
         };
         Indexed {

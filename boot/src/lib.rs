@@ -1,6 +1,7 @@
 //! The host program of Crystal Ball: set-up, disk image, QEMU and its verdict.
 
 pub mod aside;
+pub mod card;
 pub mod child;
 pub mod dump;
 pub mod indexed;

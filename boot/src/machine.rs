@@ -29,7 +29,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
-use link::{Command, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, Lines, OK, PANIC, RUNNING};
+use link::{
+    Command, Content, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, Lines, OK, PANIC, RUNNING,
+};
 use rustix::process::{Pid, Signal, kill_process_group, test_kill_process};
 use serde_json::{Value, json};
 use tempfile::TempDir;
@@ -37,13 +39,15 @@ use tempfile::TempDir;
 use patience::Patience;
 pub use verdict::{Failure, Verdict};
 
+use crate::card::Card;
 use crate::child;
+use crate::dump::Dump;
 use crate::screen::Screen;
 use crate::setup::Ready;
 
 /// From starting QEMU to the kernel's first line: ten times the 2 s that it takes alone.
 const BOOT_LIMIT: Duration = Duration::from_secs(20);
-/// For an answer of the kernel or of QEMU. Alone the slowest takes a tick and a picture.
+/// For an answer of the kernel or of QEMU: ten times the 1 s that all of video memory takes alone.
 const ANSWER_LIMIT: Duration = Duration::from_secs(10);
 /// How often a running show is asked for a sign of life.
 const HEARTBEAT: Duration = Duration::from_secs(5);
@@ -212,20 +216,6 @@ impl Machine {
         Ok(())
     }
 
-    /// Sends a command and returns the lines of its answer, without the closing `ok`.
-    ///
-    /// # Errors
-    /// A [`Failure`], or the kernel's `error`.
-    pub fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
-        self.send_line(&command.to_string())?;
-        let answer = self.answer(&command.to_string())?;
-        match answer.split_last() {
-            Some((last, lines)) if *last == format!("{OK} {command}") => Ok(lines.to_vec()),
-            Some((last, _)) => Err(anyhow!("the kernel answered '{command}' with '{last}'")),
-            None => unreachable!("an answer has a last line"),
-        }
-    }
-
     /// Sends bytes as they are.
     ///
     /// # Errors
@@ -276,18 +266,17 @@ impl Machine {
         }
     }
 
-    /// What is on the screen now, as the monitor shows it.
+    /// Switches a trace event of QEMU's on or off; where the events go is for QEMU's arguments.
     ///
     /// # Errors
-    /// A [`Failure`], or what is wrong with QEMU's picture.
-    pub fn screendump(&mut self) -> anyhow::Result<Screen> {
-        let file = self.folder.path().join("screen.ppm");
-        let answer = self.control("screendump", json!({ "filename": file }))?;
-        if let Some(error) = answer.get("error") {
-            return Err(anyhow!("QEMU takes no screendump: {error}"));
+    /// A [`Failure`], or what QEMU says.
+    pub fn trace(&mut self, event: &str, on: bool) -> anyhow::Result<()> {
+        let arguments = json!({ "name": event, "enable": on });
+        let answer = self.control("trace-event-set-state", arguments)?;
+        match answer.get("error") {
+            Some(error) => Err(anyhow!("QEMU does not trace '{event}': {error}")),
+            None => Ok(()),
         }
-        let bytes = std::fs::read(&file).context("QEMU wrote no screendump")?;
-        Screen::from_ppm(&bytes).context("QEMU's screendump is no picture")
     }
 
     /// Asks the kernel to leave, and waits until QEMU has ended by it.
@@ -531,6 +520,42 @@ impl Machine {
                 Err(_) => return,
             }
         }
+    }
+}
+
+impl Card for Machine {
+    /// Sends the command, and waits for the answer. Errors are a [`Failure`], or the kernel's
+    /// `error`.
+    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
+        self.send_line(&command.to_string())?;
+        let mut answer = self.answer(&command.to_string())?;
+        match answer.pop() {
+            Some(last) if last == format!("{OK} {command}") => Ok(answer),
+            last => {
+                let last = last.unwrap_or_default();
+                Err(anyhow!("the kernel answered '{command}' with '{last}'"))
+            }
+        }
+    }
+
+    /// A dump that is not in order is a line that is garbled in a way that no single line shows.
+    fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
+        let lines = self.ask(Command::Dump(content))?;
+        Dump::from_lines(&lines).map_err(|error| {
+            let why = format!("its dump is wrong in {error}");
+            self.fail(Verdict::Garbled { why })
+        })
+    }
+
+    /// By QEMU's `screendump`.
+    fn screen(&mut self) -> anyhow::Result<Screen> {
+        let file = self.folder.path().join("screen.ppm");
+        let answer = self.control("screendump", json!({ "filename": file }))?;
+        if let Some(error) = answer.get("error") {
+            return Err(anyhow!("QEMU takes no screendump: {error}"));
+        }
+        let bytes = std::fs::read(&file).context("QEMU wrote no screendump")?;
+        Screen::from_ppm(&bytes).context("QEMU's screendump is no picture")
     }
 }
 

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
+use crystal_ball::card::Card;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child};
@@ -203,7 +204,7 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
     }
     machine.rest(WARM_UP)?;
     let picture = ready.image.with_file_name("picture.png");
-    let screen = machine.screendump()?;
+    let screen = machine.screen()?;
     aside::write(&picture, |file| screen.write_png(file))?;
     machine.leave()?;
     say("a picture of the running ball:");

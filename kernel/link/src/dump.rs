@@ -79,7 +79,11 @@ impl fmt::Display for Row {
 impl<S> Header<S> {
     /// The rows of the dump, in their order.
     pub fn rows(&self) -> impl Iterator<Item = Row> + use<S> {
-        let (content, start) = (self.content, self.start);
+        self.rows_of(self.content)
+    }
+
+    fn rows_of(&self, content: Content) -> impl Iterator<Item = Row> + use<S> {
+        let start = self.start;
         let stride = usize::from(self.width / 4).max(1);
         let rows = match content {
             Content::Page => usize::from(self.height),
@@ -233,7 +237,7 @@ impl fmt::Display for Hex<'_> {
 ///
 /// # Panics
 /// As [`write`].
-pub fn write_checksums<S: Copy>(
+pub fn write_checksums<S>(
     header: &Header<S>,
     palette: &[[u8; 3]; 256],
     mut load: impl FnMut(u16, &mut [u8]),
@@ -241,8 +245,7 @@ pub fn write_checksums<S: Copy>(
 ) {
     let mut buffer = [0; MAX_WIDTH];
     let mut page = Checksum::new();
-    let content = Content::Page;
-    for row in (Header { content, ..*header }).rows() {
+    for row in header.rows_of(Content::Page) {
         load(row.at, &mut buffer[..row.pixels]);
         page.add(&buffer[..row.pixels]);
     }

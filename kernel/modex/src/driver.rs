@@ -123,6 +123,11 @@ impl<B: Bus> ModeX<B> {
         for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
             bus.store64(at as u16, 0);
         }
+        // Until a retrace the CRTC shows from the start address that was there before, and that is
+        // a page which may be drawn on next.
+        self.wait_for_display();
+        self.wait_for_retrace();
+        let bus = &mut self.bus;
         let clocking = MODE_X.sequencer[usize::from(CLOCKING_MODE)];
         write(bus, SEQUENCER, CLOCKING_MODE, clocking);
         self.drawn = [Drawn::EVERYTHING; PAGES];
@@ -165,7 +170,7 @@ impl<B: Bus> ModeX<B> {
     /// pages share the low byte of their start address: one write flips.
     pub fn flip(&mut self) {
         self.bus.purpose(Purpose::Flip);
-        self.wait("display", |status| status & DISPLAY_DISABLED == 0);
+        self.wait_for_display();
         let high = (page_start(self.back) >> 8) as u8;
         write(&mut self.bus, CRTC, START_ADDRESS_HIGH, high);
         self.front = self.back;
@@ -175,7 +180,7 @@ impl<B: Bus> ModeX<B> {
     /// Waits until the last flip holds: the page flipped to, and no other, is on the screen.
     pub fn settle(&mut self) {
         self.bus.purpose(Purpose::Flip);
-        self.wait("vertical retrace", |status| status & VERTICAL_RETRACE != 0);
+        self.wait_for_retrace();
         self.visible = [false; PAGES];
         self.visible[self.front] = true;
     }
@@ -221,6 +226,14 @@ impl<B: Bus> ModeX<B> {
     /// The bus underneath.
     pub fn bus(&mut self) -> &mut B {
         &mut self.bus
+    }
+
+    fn wait_for_display(&mut self) {
+        self.wait("display", |status| status & DISPLAY_DISABLED == 0);
+    }
+
+    fn wait_for_retrace(&mut self) {
+        self.wait("vertical retrace", |status| status & VERTICAL_RETRACE != 0);
     }
 
     fn wait(&mut self, what: &str, holds: impl Fn(u8) -> bool) {

@@ -3,6 +3,23 @@
 use crate::Vga;
 use crate::fault::Complaint;
 
+/// The page on the screen, in palette indices, each pixel once.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Page {
+    /// The start address that the CRTC has taken over.
+    pub start: u16,
+    /// Pixels across.
+    pub width: usize,
+    /// Pixels down.
+    pub height: usize,
+    /// `width * height` indices, row by row.
+    pub pixels: Vec<u8>,
+    /// The DAC's colours, 6 bits each of red, green and blue.
+    pub palette: [[u8; 3]; 256],
+    /// Scan lines that each line takes.
+    repeat: usize,
+}
+
 /// What a frame shows, a colour for every dot: 640x480 in Mode X, each pixel two by two.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Picture {
@@ -14,7 +31,7 @@ pub struct Picture {
     pub dots: Vec<[u8; 3]>,
 }
 
-impl Picture {
+impl Page {
     pub(crate) fn of(card: &Vga) -> Result<Self, Complaint> {
         card.sequencer.check_picture()?;
         card.attribute.check_picture(card.graphics.is_graphics())?;
@@ -25,24 +42,60 @@ impl Picture {
                 "the beam never came to a retrace".into(),
             ));
         };
-        // A 256-colour pixel takes two dots.
-        let width = 2 * geometry.width;
-        let mut dots = Vec::with_capacity(width * geometry.lines);
-        for line in 0..geometry.lines {
-            let y = line / geometry.repeat;
+        let height = geometry.lines / geometry.repeat;
+        let mut pixels = Vec::with_capacity(geometry.width * height);
+        for y in 0..height {
             for x in 0..geometry.width {
                 let offset = y * geometry.stride + x / 4;
                 // The address counter is 16 bits wide: it wraps within the plane.
                 let at = start.wrapping_add(offset as u16);
-                let pixel = card.attribute.colour(card.memory.peek(x & 3, at));
-                dots.extend([card.dac.colour(pixel)?; 2]);
+                pixels.push(card.attribute.colour(card.memory.peek(x & 3, at)));
             }
         }
+        let mut palette = [[0; 3]; 256];
+        for (index, colour) in (0..=255).zip(&mut palette) {
+            *colour = card.dac.colour(index)?;
+        }
         Ok(Self {
-            width,
-            height: geometry.lines,
-            dots,
+            start,
+            width: geometry.width,
+            height,
+            pixels,
+            palette,
+            repeat: geometry.repeat,
         })
+    }
+
+    /// The page as the monitor shows it.
+    pub fn scan_out(&self) -> Picture {
+        // A 256-colour pixel takes two dots.
+        let width = 2 * self.width;
+        let height = self.height * self.repeat;
+        let mut dots = Vec::with_capacity(width * height);
+        for line in 0..height {
+            let row = &self.pixels[line / self.repeat * self.width..][..self.width];
+            dots.extend(
+                row.iter()
+                    .flat_map(|&pixel| [self.palette[usize::from(pixel)]; 2]),
+            );
+        }
+        Picture {
+            width,
+            height,
+            dots,
+        }
+    }
+}
+
+impl std::fmt::Debug for Page {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            width,
+            height,
+            start,
+            ..
+        } = self;
+        write!(f, "a page of {width} x {height} at {start:04x}")
     }
 }
 

@@ -12,7 +12,7 @@ use crate::dac::Dac;
 use crate::fault::{Access, Complaint, Fault};
 use crate::graphics::Graphics;
 use crate::memory::{Memory, PAGES_END};
-use crate::scanout::Picture;
+use crate::scanout::{Page, Picture};
 use crate::sequencer::Sequencer;
 
 /// A card as the boot loader leaves it: in a linear mode, no VGA register known.
@@ -98,16 +98,24 @@ impl Vga {
         self.memory.peek(plane, at)
     }
 
-    /// The picture on the monitor.
+    /// The page on the screen.
     ///
     /// # Errors
     /// Why there is none, or a garbled one; that is no fault of an access, so it is not noted.
-    pub fn scan_out(&self) -> Result<Picture, Fault> {
-        Picture::of(self).map_err(|(name, state)| Fault {
+    pub fn page(&self) -> Result<Page, Fault> {
+        Page::of(self).map_err(|(name, state)| Fault {
             name,
             access: Access::ScanOut,
             state,
         })
+    }
+
+    /// The picture on the monitor.
+    ///
+    /// # Errors
+    /// As [`Vga::page`].
+    pub fn scan_out(&self) -> Result<Picture, Fault> {
+        Ok(self.page()?.scan_out())
     }
 
     /// Moves the beam until a retrace has begun, as a monitor would without any program.

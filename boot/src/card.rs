@@ -1,0 +1,189 @@
+//! Cards that a show runs on: QEMU's, and the emulated one.
+//!
+//! Both take the same commands and give the same kinds of evidence, so what is asked of one can be
+//! asked of the other and the answers compared. What they share is the program (driver, renderer);
+//! how the evidence is taken they do not. QEMU's card is read by the kernel, through Read Map and
+//! the DAC's read port, and its screen by QEMU. The emulated card is looked into from outside, and
+//! its geometry comes from its registers.
+
+use anyhow::{anyhow, bail};
+use emulator::Vga;
+use link::dump::{Header, PLANE_BYTES};
+use link::{Command, Content, ERROR, OK, Picture};
+use show::{Memory, Show};
+
+use crate::dump::Dump;
+use crate::indexed::widen;
+use crate::screen::Screen;
+
+/// A card with a show on it.
+pub trait Card {
+    /// Carries a command out; the lines of its answer, without the closing `ok`.
+    ///
+    /// # Errors
+    /// The program's `error`, or why there is no answer.
+    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>>;
+
+    /// What the card holds.
+    ///
+    /// # Errors
+    /// As [`Card::ask`], and a dump that is none.
+    fn dump(&mut self, content: Content) -> anyhow::Result<Dump>;
+
+    /// What the monitor shows.
+    ///
+    /// # Errors
+    /// Why there is no picture.
+    fn screen(&mut self) -> anyhow::Result<Screen>;
+
+    /// Holds the show anew and has `pictures` shown, one after the other.
+    ///
+    /// # Errors
+    /// As [`Card::ask`].
+    fn show(&mut self, pictures: &[Picture]) -> anyhow::Result<()> {
+        self.ask(Command::Hold)?;
+        for &picture in pictures {
+            self.ask(Command::Show(picture))?;
+        }
+        Ok(())
+    }
+}
+
+/// The show on the emulated card.
+#[derive(Debug)]
+pub struct Emulated<'a> {
+    show: Show<'a, Vga>,
+    scene: String,
+    picture: Option<Picture>,
+}
+
+impl<'a> Emulated<'a> {
+    /// The show, held, on a card that was just switched on.
+    ///
+    /// # Errors
+    /// What the card finds wrong with the mode set.
+    pub fn new(memory: &'a mut Memory) -> anyhow::Result<Self> {
+        let mut this = Self {
+            show: Show::new(memory, Vga::new()),
+            scene: String::new(),
+            picture: None,
+        };
+        this.ask(Command::Hold)?;
+        let state = this.ask(Command::State)?;
+        let scene = state.iter().find_map(|line| line.strip_prefix("scene "));
+        this.scene = scene.unwrap_or_default().to_string();
+        Ok(this)
+    }
+
+    /// The card itself.
+    pub fn vga(&mut self) -> &mut Vga {
+        self.show.bus()
+    }
+}
+
+impl Card for Emulated<'_> {
+    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
+        let mut answer = Vec::new();
+        let request = self
+            .show
+            .obey(command, 0, &mut |line| answer.push(line.to_string()));
+        let faults = self.show.bus().take_faults();
+        if let Some(fault) = faults.first() {
+            let count = faults.len();
+            bail!("the emulated card finds {count} accesses at fault, the first: {fault}");
+        }
+        if let Some(request) = request {
+            bail!("the emulated card has no machine that could '{request:?}'");
+        }
+        match command {
+            Command::Hold => self.picture = None,
+            Command::Show(picture) => self.picture = Some(picture),
+            _ => {}
+        }
+        match answer.pop() {
+            Some(last) if last == format!("{OK} {command}") => Ok(answer),
+            Some(error) => {
+                let error = error.strip_prefix(ERROR).unwrap_or(&error);
+                Err(anyhow!("'{command}' is refused:{error}"))
+            }
+            None => Err(anyhow!("'{command}' was not answered")),
+        }
+    }
+
+    fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
+        let vga = self.show.bus();
+        let page = vga.page().map_err(|fault| anyhow!("{fault}"))?;
+        let pixels = match content {
+            Content::Page => page.pixels,
+            Content::Memory => (0..4 * PLANE_BYTES)
+                .map(|i| vga.peek(i & 3, (i / 4) as u16))
+                .collect(),
+        };
+        Ok(Dump {
+            header: Header {
+                content,
+                scene: self.scene.clone(),
+                picture: self.picture,
+                start: page.start,
+                width: page.width.try_into()?,
+                height: page.height.try_into()?,
+            },
+            palette: page.palette,
+            pixels,
+        })
+    }
+
+    fn screen(&mut self) -> anyhow::Result<Screen> {
+        let vga = self.show.bus();
+        let picture = vga.scan_out().map_err(|fault| anyhow!("{fault}"))?;
+        let wide = |colour: [u8; 3]| colour.map(widen);
+        Ok(Screen {
+            width: picture.width,
+            height: picture.height,
+            pixels: picture.dots.into_iter().map(wide).collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The kernel's own way to a dump, through the card's ports, against a look from outside.
+    #[test]
+    fn what_the_program_reads_back_is_what_the_card_holds() {
+        let mut memory = Box::new(Memory::new());
+        let mut card = Emulated::new(&mut memory).unwrap();
+        for pictures in [&[][..], &[Picture::Frame(0)], &[Picture::Frame(7); 3]] {
+            card.show(pictures).unwrap();
+            for content in [Content::Page, Content::Memory] {
+                let seen = card.dump(content).unwrap();
+                let told = card.ask(Command::Dump(content)).unwrap();
+                assert_eq!(told, seen.lines());
+                assert_eq!(Dump::from_lines(&told).unwrap(), seen);
+                assert_eq!(
+                    card.ask(Command::Checksums(content)).unwrap(),
+                    seen.checksums()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_refused_command_says_why() {
+        let mut memory = Box::new(Memory::new());
+        let mut card = Emulated::new(&mut memory).unwrap();
+        let far = Picture::Pose {
+            yaw: 0,
+            pitch: 0,
+            roll: 0,
+            distance: u32::MAX,
+        };
+        let error = card.show(&[far]).unwrap_err().to_string();
+        assert!(
+            error.ends_with("is refused: a distance is 0 to 00800000"),
+            "{error}"
+        );
+        assert!(card.ask(Command::Leave).is_err());
+    }
+}
