@@ -187,9 +187,8 @@ fn what_the_monitor_would_not_show() {
         shown(&|v| v.out16(GRAPHICS, word(6, 0x04))),
         Some("AR10 and GR6 disagree about graphics")
     );
-    let mut vga = Vga::new();
-    ModeX::set(&mut vga, &BLACK).unwrap();
-    assert_eq!(vga.scan_out().unwrap_err().name, "no frame was begun");
+    let switched_on = Vga::new().scan_out();
+    assert_eq!(switched_on.unwrap_err().name, "sequencer is in reset");
 }
 
 #[test]
