@@ -4,6 +4,7 @@ pub mod aside;
 pub mod card;
 pub mod child;
 pub mod dump;
+pub mod frames;
 pub mod indexed;
 pub mod machine;
 pub mod screen;

@@ -9,10 +9,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
-use crystal_ball::card::Card;
+use crystal_ball::card::{Card, Emulated};
+use crystal_ball::frames::Frames;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child};
+use show::Memory;
 
 /// How long the ball turns before its picture is taken without a display.
 const WARM_UP: Duration = Duration::from_secs(1);
@@ -76,6 +78,11 @@ enum Subcommands {
     Doctor,
     /// Remove what the set-up keeps, and say how much that was
     Clean,
+    /// Take dumps: boot, show each picture, and write what the card then holds, as text that
+    /// `diff` can compare and as a PNG
+    Dump(Frames),
+    /// Write the same files from the emulated card alone, without QEMU
+    Emulate(Frames),
     /// Write the bootable disk image
     Image {
         /// The file to write
@@ -154,6 +161,20 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
         Some(Subcommands::Clean) => {
             setup::clean(&mut Output)?;
         }
+        Some(Subcommands::Dump(frames)) => {
+            let ready = setup::ready(&options)?;
+            let mut machine = Machine::boot(&Config {
+                vga: cli.boot.vga,
+                arguments: cli.qemu_arguments,
+                ..Config::new(&ready)
+            })?;
+            frames.write(&mut machine, tell_path)?;
+            machine.leave()?;
+        }
+        Some(Subcommands::Emulate(frames)) => {
+            let mut memory = Box::new(Memory::new());
+            frames.write(&mut Emulated::new(&mut memory)?, tell_path)?;
+        }
         Some(Subcommands::Image { out }) => write_image(&setup::image(&options)?, &out)?,
         None => {
             options.window = !cli.boot.headless && has_display();
@@ -162,6 +183,11 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// A file was written: its path goes where the next program in a pipe reads it.
+fn tell_path(path: &Path) -> io::Result<()> {
+    writeln!(Output, "{}", path.display())
 }
 
 /// Whether there is a display that a window could open on.

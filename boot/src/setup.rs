@@ -23,7 +23,8 @@ mod rustup;
 mod toolchain;
 
 use cache::Cache;
-pub use progress::say;
+pub use build::root;
+pub use progress::{Step, say};
 pub use qemu::Qemu;
 
 /// What the user may decide about the set-up.

@@ -26,23 +26,41 @@ pub fn bytes(count: u64) -> impl Display {
 }
 
 /// A step that takes a while: announced when made, then told how far it is.
+#[derive(Debug)]
 pub struct Step {
     total: u64,
     begun: Instant,
     /// Without a terminal: when the last line was written, and how far it was, in per cent.
     said: (Instant, u64),
+    /// How an amount is told.
+    amount: fn(u64) -> String,
     bar: Option<ProgressBar>,
 }
 
 impl Step {
     /// A step of `total` bytes, or of unknown length (0).
     pub fn new(what: impl Display, total: u64) -> Self {
+        let template = match total {
+            0 => "  {spinner} {elapsed}",
+            _ => "  {wide_bar} {bytes} of {total_bytes}, {elapsed}",
+        };
+        Self::with(what, total, template, |count| bytes(count).to_string())
+    }
+
+    /// A step of `total` things.
+    pub fn counting(what: impl Display, total: u64) -> Self {
+        let template = "  {wide_bar} {pos} of {len}, {elapsed}";
+        Self::with(what, total, template, |count| count.to_string())
+    }
+
+    fn with(
+        what: impl Display,
+        total: u64,
+        template: &str,
+        amount: fn(u64) -> String,
+    ) -> Self {
         say(what);
         let bar = stderr().is_terminal().then(|| {
-            let template = match total {
-                0 => "  {spinner} {elapsed}",
-                _ => "  {wide_bar} {bytes} of {total_bytes}, {elapsed}",
-            };
             let style = ProgressStyle::with_template(template).expect("the template is constant");
             ProgressBar::new(total).with_style(style)
         });
@@ -51,6 +69,7 @@ impl Step {
             total,
             begun,
             said: (begun, 0),
+            amount,
             bar,
         }
     }
@@ -71,7 +90,11 @@ impl Step {
                     "  {} s, still at it",
                     self.begun.elapsed().as_secs()
                 )),
-                total => say(format_args!("  {} of {}", bytes(done), bytes(total))),
+                total => say(format_args!(
+                    "  {} of {}",
+                    (self.amount)(done),
+                    (self.amount)(total)
+                )),
             }
         }
     }
