@@ -123,9 +123,7 @@ impl Frames {
             let dump = card.dump(content)?;
             let stem = self.out.join(stem(picture, content));
             let text = stem.with_added_extension("dump");
-            aside::write(&text, |file| {
-                Ok(dump.write(std::io::BufWriter::new(file))?)
-            })?;
+            aside::write(&text, |file| Ok(dump.write(std::io::BufWriter::new(file))?))?;
             let png = stem.with_added_extension("png");
             aside::write(&png, |file| dump.picture().write_png(file))?;
             step.at(done);

@@ -3,9 +3,12 @@
 pub mod aside;
 pub mod card;
 pub mod child;
+pub mod diff;
 pub mod dump;
 pub mod frames;
+pub mod golden;
 pub mod indexed;
 pub mod machine;
+pub mod report;
 pub mod screen;
 pub mod setup;

@@ -10,7 +10,9 @@ use std::time::{Duration, Instant};
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use crystal_ball::card::{Card, Emulated};
+use crystal_ball::diff;
 use crystal_ball::frames::Frames;
+use crystal_ball::golden;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child};
@@ -46,6 +48,7 @@ Examples (`cargo run -- ` hands on what follows):
   cargo run -- --vga cirrus            on another display adapter
   cargo run -- -- -machine q35 -m 64   with more arguments for QEMU
   cargo run -- doctor                  what is set up, and where
+  cargo run -- diff A B                what differs in two dumps, PNGs or folders
   cargo run -- image --out ball.img    the disk image, for another emulator
 
 Exit codes: 0 done; 1 set-up failed; 2 wrong usage; 10 panic; 11 CPU exception; 12 triple fault;
@@ -83,6 +86,23 @@ enum Subcommands {
     Dump(Frames),
     /// Write the same files from the emulated card alone, without QEMU
     Emulate(Frames),
+    /// Compare two dumps, two indexed PNGs, or two folders of them, and tell what differs
+    ///
+    /// Exit codes: 0 equal; 1 different; 2 could not compare.
+    Diff {
+        /// What is expected
+        a: PathBuf,
+        /// What is to be compared with it
+        b: PathBuf,
+        /// Show what differs in an HTML file, with pictures in a folder FILE-files beside it
+        #[arg(long, value_name = "FILE.html")]
+        report: Option<PathBuf>,
+    },
+    /// Make the emulated card's pictures the golden frames, where QEMU agrees; look at each first
+    Bless {
+        /// The golden frames' folder [default: tests/golden of the workspace]
+        folder: Option<PathBuf>,
+    },
     /// Write the bootable disk image
     Image {
         /// The file to write
@@ -175,6 +195,19 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             let mut memory = Box::new(Memory::new());
             frames.write(&mut Emulated::new(&mut memory)?, tell_path)?;
         }
+        Some(Subcommands::Diff { a, b, report }) => return compare(&a, &b, report.as_deref()),
+        Some(Subcommands::Bless { folder }) => {
+            let folder = folder.unwrap_or_else(golden::folder);
+            let report = setup::folder().join("bless").join("report.html");
+            let boot = || Machine::boot(&Config::new(&setup::ready(&options)?));
+            match golden::bless(&folder, &report, boot, |line| say(line))? {
+                0 => say("nothing to bless: every golden frame is as it was"),
+                count => say(format_args!(
+                    "{count} golden frames blessed in {}",
+                    folder.display()
+                )),
+            }
+        }
         Some(Subcommands::Image { out }) => write_image(&setup::image(&options)?, &out)?,
         None => {
             options.window = !cli.boot.headless && has_display();
@@ -236,6 +269,18 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
     say("a picture of the running ball:");
     writeln!(Output, "{}", picture.display())?;
     Ok(())
+}
+
+/// Here 1 means that something differs: an error is 2, as for `diff` and `cmp`.
+fn compare(a: &Path, b: &Path, report: Option<&Path>) -> anyhow::Result<ExitCode> {
+    let outcome = match diff::run(a, b, report, &mut Output) {
+        Err(error) if !error.is::<child::Interrupted>() => {
+            say(format_args!("error: {error:#}"));
+            diff::Outcome::Incomparable
+        }
+        outcome => outcome?,
+    };
+    Ok(ExitCode::from(outcome.exit_code()))
 }
 
 fn write_image(image: &Path, out: &Path) -> anyhow::Result<()> {

@@ -22,8 +22,8 @@ mod qemu;
 mod rustup;
 mod toolchain;
 
-use cache::Cache;
 pub use build::root;
+use cache::Cache;
 pub use progress::{Step, say};
 pub use qemu::Qemu;
 
@@ -47,6 +47,12 @@ pub struct Ready {
     pub kernel: PathBuf,
     /// The QEMU to boot it with.
     pub qemu: Qemu,
+}
+
+/// Where this workspace's image is, and what is made beside it.
+pub fn folder() -> PathBuf {
+    let [_, image] = build::folders();
+    image
 }
 
 /// Does the whole set-up, or what is left of it to do.

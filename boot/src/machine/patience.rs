@@ -48,15 +48,16 @@ impl Patience {
 
     /// Whether it is over.
     pub fn is_over(&mut self) -> bool {
+        // A process that has just ended has used less than before: none.
         let (now, used) = (Instant::now(), processor_time(self.process));
         let (since, before) = self.looked;
         let mut idle = false;
         if now - since >= LOOK {
-            idle = (used - before) * 100 < (now - since) * IDLE_PERCENT;
+            idle = used.saturating_sub(before) * 100 < (now - since) * IDLE_PERCENT;
             self.looked = (now, used);
         }
         let waited = now - self.began;
-        used - self.used >= self.limit
+        used.saturating_sub(self.used) >= self.limit
             || (idle && waited >= self.limit)
             || waited >= self.limit * AT_MOST
     }
@@ -106,6 +107,26 @@ mod tests {
         }
         assert!(begun.elapsed() >= Duration::from_millis(90));
         patience.renew();
+        assert!(!patience.is_over());
+    }
+
+    #[test]
+    fn a_process_that_ended_meanwhile_is_waited_for_by_the_clock() {
+        let mut child = std::process::Command::new("sh")
+            .args([
+                "-c",
+                "i=0; while [ $i -lt 100000 ]; do i=$((i + 1)); done; read line",
+            ])
+            .stdin(std::process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let process = Pid::from_child(&child);
+        while processor_time(process).is_zero() {
+            std::thread::yield_now();
+        }
+        let mut patience = Patience::new(process, Duration::from_secs(60));
+        drop(child.stdin.take());
+        child.wait().unwrap();
         assert!(!patience.is_over());
     }
 }

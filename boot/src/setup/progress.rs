@@ -53,12 +53,7 @@ impl Step {
         Self::with(what, total, template, |count| count.to_string())
     }
 
-    fn with(
-        what: impl Display,
-        total: u64,
-        template: &str,
-        amount: fn(u64) -> String,
-    ) -> Self {
+    fn with(what: impl Display, total: u64, template: &str, amount: fn(u64) -> String) -> Self {
         say(what);
         let bar = stderr().is_terminal().then(|| {
             let style = ProgressStyle::with_template(template).expect("the template is constant");

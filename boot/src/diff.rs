@@ -1,0 +1,953 @@
+//! `diff`: two dumps, two indexed PNGs, or two folders of them, byte by byte.
+//!
+//! Indices are compared, not colours: what the card holds, and not what it looks like. The palette
+//! is compared for itself. Nothing passes by luck: what can't be compared, a file that one folder
+//! lacks, and a comparison of nothing are told apart from "equal" and from "different".
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::fmt;
+use std::fs::{self, File};
+use std::io::{Cursor, Read, Write};
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use link::Content;
+use link::dump::{MAGIC, PLANE_BYTES};
+use modex::Rgb6;
+
+use crate::child;
+use crate::dump::Dump;
+use crate::indexed::Indexed;
+use crate::report::Report;
+use crate::setup::say;
+
+/// How every PNG begins.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+/// Most bytes that are read of a file; a dump of all memory has about half a million. There are
+/// files without an end.
+const MAX_BYTES: u64 = 1 << 26;
+/// Most pixels of a PNG: its header may claim more than there is memory for.
+const MAX_PIXELS: u64 = 1 << 24;
+/// Endings of the files that are looked for in a folder.
+const ENDINGS: [&str; 2] = ["dump", "png"];
+
+/// What can be compared.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "either has its pixels on the heap"
+)]
+pub enum Subject {
+    /// What a card held.
+    Dump(Dump),
+    /// A picture, from an indexed PNG.
+    Picture(Indexed),
+}
+
+impl Subject {
+    /// Reads a PNG or a dump; the content decides which, not the name.
+    ///
+    /// # Errors
+    /// A file that can't be read, or is neither: with its name, and the line where a dump is wrong.
+    pub fn read(path: &Path) -> anyhow::Result<Self> {
+        Self::load(path).with_context(|| path.display().to_string())
+    }
+
+    fn load(path: &Path) -> anyhow::Result<Self> {
+        let mut bytes = Vec::new();
+        File::open(path)
+            .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+            .context("it cannot be read")?;
+        if bytes.len() as u64 > MAX_BYTES {
+            bail!("it has more than {MAX_BYTES} bytes: it is neither dump nor picture");
+        }
+        if bytes.starts_with(PNG) {
+            return Ok(Self::Picture(read_png(&bytes)?));
+        }
+        let dump = Dump::read(&bytes);
+        Ok(Self::Dump(dump.map_err(|error| {
+            anyhow::anyhow!(if bytes.starts_with(MAGIC.as_bytes()) {
+                format!("{error}; take the dump again")
+            } else {
+                format!("{error}, nor is it a PNG; `diff` compares dumps and indexed PNGs")
+            })
+        })?))
+    }
+
+    /// The picture that is on the screen.
+    pub(crate) fn picture(&self) -> Cow<'_, Indexed> {
+        match self {
+            Self::Dump(dump) => Cow::Owned(dump.picture()),
+            Self::Picture(picture) => Cow::Borrowed(picture),
+        }
+    }
+}
+
+fn read_png(bytes: &[u8]) -> anyhow::Result<Indexed> {
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    let cut = "it is no whole PNG";
+    let header = decoder.read_header_info().context(cut)?;
+    let (width, height) = (header.width, header.height);
+    if u64::from(width) * u64::from(height) > MAX_PIXELS {
+        bail!("its header claims {width} x {height} pixels; `diff` takes up to {MAX_PIXELS}");
+    }
+    Indexed::read_png(Cursor::new(bytes)).map_err(|error| {
+        if error.is::<png::DecodingError>() {
+            error.context(cut)
+        } else {
+            anyhow::anyhow!(
+                "{error:#}; `diff` compares indices, as this program's own PNGs keep them"
+            )
+        }
+    })
+}
+
+/// In what two subjects differ; [`Display`](fmt::Display) tells it in a line.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Difference {
+    /// The pixels that differ, or the bytes of all memory.
+    pub pixels: Option<Pixels>,
+    /// The palette's entries that differ.
+    pub palette: Option<Colours>,
+    /// What the dumps' headers say differently.
+    pub fields: Vec<Field>,
+}
+
+/// The pixels that differ.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Pixels {
+    /// Where the first of them is: the uppermost line's leftmost; of memory, the lowest address's
+    /// lowest plane.
+    pub first: Place,
+    /// The value that is expected there.
+    pub expected: u8,
+    /// The value that is there.
+    pub got: u8,
+    /// How many differ.
+    pub count: usize,
+    /// How many there are.
+    pub of: usize,
+    /// The box around those that differ; of memory, in the picture whose lines are the dump's.
+    pub bounds: Bounds,
+    /// How many differ in each plane.
+    pub planes: [usize; 4],
+    /// How many differ in each page, and past the last page; empty if a picture was compared.
+    pub pages: Vec<usize>,
+}
+
+/// Where a pixel is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// The plane.
+    pub plane: usize,
+    /// From the left, of its page.
+    pub x: usize,
+    /// From the top, of its page.
+    pub y: usize,
+    /// Where it is in video memory, if that was compared.
+    pub memory: Option<Address>,
+}
+
+/// Where a byte is in video memory.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Address {
+    /// Its address in the plane.
+    pub address: u16,
+    /// The page that it is in; none past the last.
+    pub page: Option<usize>,
+}
+
+/// A box of pixels; both ends are in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bounds {
+    /// Leftmost column.
+    pub x0: usize,
+    /// Rightmost column.
+    pub x1: usize,
+    /// Uppermost line.
+    pub y0: usize,
+    /// Lowest line.
+    pub y1: usize,
+}
+
+/// The palette's entries that differ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Colours {
+    /// The first of them.
+    pub first: usize,
+    /// Its expected colour; none where the expected palette has ended.
+    pub expected: Option<Rgb6>,
+    /// Its colour; none where the palette has ended.
+    pub got: Option<Rgb6>,
+    /// How many differ.
+    pub count: usize,
+    /// How many the longer palette has.
+    pub of: usize,
+}
+
+/// A line of the dumps' headers that differs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Field {
+    /// Its label.
+    pub name: &'static str,
+    /// What is expected.
+    pub expected: String,
+    /// What is there.
+    pub got: String,
+}
+
+/// How the pixels of two subjects lie.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    /// Pixels in a line.
+    pub width: usize,
+    /// Lines of a page, if there is more than one page: the whole memory.
+    pub memory: Option<usize>,
+}
+
+impl Shape {
+    pub fn place(&self, i: usize) -> Place {
+        let (x, y) = (i % self.width, i / self.width);
+        let (y, memory) = match self.memory {
+            None => (y, None),
+            Some(height) => {
+                let page = Some(y / height).filter(|&page| page < self.pages(height));
+                let address = (i / 4) as u16;
+                (y % height, Some(Address { address, page }))
+            }
+        };
+        Place {
+            plane: i & 3,
+            x,
+            y,
+            memory,
+        }
+    }
+
+    /// Whole pages in memory.
+    fn pages(&self, height: usize) -> usize {
+        4 * PLANE_BYTES / (self.width * height)
+    }
+
+    /// Compares pixels.
+    pub fn compare(&self, expected: &[u8], got: &[u8]) -> Option<Pixels> {
+        let mut planes = [0; 4];
+        let mut pages = match self.memory {
+            Some(height) => vec![0; self.pages(height) + 1],
+            None => Vec::new(),
+        };
+        let past = pages.len().saturating_sub(1);
+        let mut found: Option<Pixels> = None;
+        for (i, (&expected, &got)) in expected.iter().zip(got).enumerate() {
+            if expected == got {
+                continue;
+            }
+            let place = self.place(i);
+            planes[place.plane] += 1;
+            if let Some(memory) = place.memory {
+                pages[memory.page.unwrap_or(past)] += 1;
+            }
+            let (x, y) = (i % self.width, i / self.width);
+            let pixels = found.get_or_insert(Pixels {
+                first: place,
+                expected,
+                got,
+                count: 0,
+                of: 0,
+                bounds: Bounds {
+                    x0: x,
+                    x1: x,
+                    y0: y,
+                    y1: y,
+                },
+                planes,
+                pages: Vec::new(),
+            });
+            let Bounds { x0, x1, y0, y1 } = pixels.bounds;
+            pixels.bounds = Bounds {
+                x0: x0.min(x),
+                x1: x1.max(x),
+                y0: y0.min(y),
+                y1: y1.max(y),
+            };
+        }
+        let found = found?;
+        Some(Pixels {
+            count: planes.iter().sum(),
+            of: expected.len(),
+            planes,
+            pages,
+            ..found
+        })
+    }
+}
+
+/// Compares two subjects; equal ones have no difference. A dump and a picture are compared as
+/// pictures.
+///
+/// # Errors
+/// When they can't be compared: other contents or sizes, or palettes that hold the same colours in
+/// another order, as some programs leave them in a PNG: its indices then say nothing.
+pub fn compare(expected: &Subject, got: &Subject) -> anyhow::Result<Option<Difference>> {
+    let difference = match (expected, got) {
+        (Subject::Dump(expected), Subject::Dump(got)) => compare_dumps(expected, got)?,
+        (expected, got) => {
+            let (expected, got) = (expected.picture(), got.picture());
+            same_size((expected.width, expected.height), (got.width, got.height))?;
+            same_order(&expected.palette, &got.palette)?;
+            let shape = Shape {
+                width: expected.width,
+                memory: None,
+            };
+            Difference {
+                pixels: shape.compare(&expected.pixels, &got.pixels),
+                palette: compare_palettes(&expected.palette, &got.palette),
+                fields: Vec::new(),
+            }
+        }
+    };
+    Ok((!difference.is_none()).then_some(difference))
+}
+
+fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
+    let (a, b) = (&expected.header, &got.header);
+    if a.content != b.content {
+        bail!(
+            "expected is a dump of {}, got one of {}; take both alike",
+            content(a.content),
+            content(b.content)
+        );
+    }
+    same_size((a.width, a.height), (b.width, b.height))?;
+    let picture = |picture: Option<link::Picture>| match picture {
+        Some(picture) => picture.to_string(),
+        None => "none".into(),
+    };
+    let fields = [
+        ("scene", a.scene.clone(), b.scene.clone()),
+        ("picture", picture(a.picture), picture(b.picture)),
+        (
+            "start",
+            format!("{:04x}", a.start),
+            format!("{:04x}", b.start),
+        ),
+    ];
+    let field = |(name, expected, got)| Field {
+        name,
+        expected,
+        got,
+    };
+    let shape = Shape {
+        width: a.width.into(),
+        memory: (a.content == Content::Memory).then_some(a.height.into()),
+    };
+    Ok(Difference {
+        pixels: shape.compare(&expected.pixels, &got.pixels),
+        palette: compare_palettes(&expected.palette, &got.palette),
+        fields: fields
+            .into_iter()
+            .filter(|(_, expected, got)| expected != got)
+            .map(field)
+            .collect(),
+    })
+}
+
+fn content(content: Content) -> &'static str {
+    match content {
+        Content::Page => "a page",
+        Content::Memory => "all memory",
+    }
+}
+
+fn same_size<T: PartialEq + fmt::Display>(expected: (T, T), got: (T, T)) -> anyhow::Result<()> {
+    if expected != got {
+        bail!(
+            "expected is {} x {}, got {} x {}",
+            expected.0,
+            expected.1,
+            got.0,
+            got.1
+        );
+    }
+    Ok(())
+}
+
+/// Refuses palettes whose colours are the same, and in other places.
+fn same_order(expected: &[Rgb6], got: &[Rgb6]) -> anyhow::Result<()> {
+    let mut pairs = expected.iter().zip(got).enumerate();
+    let Some((entry, (a, b))) = pairs.find(|(_, (a, b))| a != b) else {
+        return Ok(());
+    };
+    let set = |palette: &[Rgb6]| palette.iter().copied().collect::<BTreeSet<_>>();
+    if set(expected) == set(got) {
+        bail!(
+            "the palettes hold the same colours in another order (entry {entry:02x}: expected {}, \
+             got {}); indices can't be compared",
+            Colour(*a),
+            Colour(*b)
+        );
+    }
+    Ok(())
+}
+
+fn compare_palettes(expected: &[Rgb6], got: &[Rgb6]) -> Option<Colours> {
+    let of = expected.len().max(got.len());
+    let mut entries = differing_entries(expected, got);
+    let first = entries.next()?;
+    Some(Colours {
+        first,
+        expected: expected.get(first).copied(),
+        got: got.get(first).copied(),
+        count: 1 + entries.count(),
+        of,
+    })
+}
+
+/// The palette's entries that differ.
+pub(crate) fn differing_entries(expected: &[Rgb6], got: &[Rgb6]) -> impl Iterator<Item = usize> {
+    let of = expected.len().max(got.len());
+    (0..of).filter(|&entry| expected.get(entry) != got.get(entry))
+}
+
+/// A colour, as dumps write it.
+pub(crate) struct Colour(pub Rgb6);
+
+impl fmt::Display for Colour {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [red, green, blue] = self.0;
+        write!(f, "{red:02x}{green:02x}{blue:02x}")
+    }
+}
+
+/// An entry's colour, as dumps write it.
+pub(crate) fn colour(colour: Option<Rgb6>) -> String {
+    colour.map_or("nothing".into(), |colour| Colour(colour).to_string())
+}
+
+impl Difference {
+    fn is_none(&self) -> bool {
+        self.pixels.is_none() && self.palette.is_none() && self.fields.is_empty()
+    }
+
+    /// What differs, one thing after the other.
+    pub(crate) fn parts(&self) -> Vec<String> {
+        let pixels = self.pixels.iter().map(ToString::to_string);
+        let palette = self.palette.iter().map(ToString::to_string);
+        let fields = self.fields.iter().map(ToString::to_string);
+        pixels.chain(palette).chain(fields).collect()
+    }
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.parts().join("; "))
+    }
+}
+
+/// `count` of `of` `what` differ, as English has it.
+fn differ(f: &mut fmt::Formatter<'_>, count: usize, of: usize, what: &str) -> fmt::Result {
+    let s = if count == 1 { "s" } else { "" };
+    write!(f, "{count} of {of} {what} differ{s}")
+}
+
+impl fmt::Display for Pixels {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let memory = !self.pages.is_empty();
+        let what = if memory { "bytes" } else { "pixels" };
+        differ(f, self.count, self.of, what)?;
+        let (expected, got) = (self.expected, self.got);
+        write!(
+            f,
+            ", first {}: expected {expected:02x}, got {got:02x}",
+            self.first
+        )?;
+        if !memory {
+            return match self.count {
+                1 => Ok(()),
+                _ => write!(f, "; all in {}", self.bounds),
+            };
+        }
+        let [p0, p1, p2, p3] = self.planes;
+        write!(f, "; in plane 0: {p0}, 1: {p1}, 2: {p2}, 3: {p3}")?;
+        let past = self.pages.len() - 1;
+        for (page, count) in self.pages.iter().enumerate().filter(|&(_, &n)| n > 0) {
+            match page == past {
+                true => write!(f, "; past the last page: {count}")?,
+                false => write!(f, "; in page {page}: {count}")?,
+            }
+        }
+        Ok(())
+    }
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            plane,
+            x,
+            y,
+            memory,
+        } = self;
+        match memory {
+            None => write!(f, "plane {plane}, x {x}, y {y}"),
+            Some(Address { address, page }) => {
+                write!(f, "plane {plane}, address {address:04x} ")?;
+                match page {
+                    Some(page) => write!(f, "(page {page}, x {x}, y {y})"),
+                    None => write!(f, "(past the last page)"),
+                }
+            }
+        }
+    }
+}
+
+impl fmt::Display for Bounds {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { x0, x1, y0, y1 } = self;
+        write!(f, "x {x0}..{x1}, y {y0}..{y1}, ends included")
+    }
+}
+
+impl fmt::Display for Colours {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        differ(f, self.count, self.of, "palette entries")?;
+        let (expected, got) = (colour(self.expected), colour(self.got));
+        let first = self.first;
+        write!(f, ", first {first:02x}: expected {expected}, got {got}")
+    }
+}
+
+impl fmt::Display for Field {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            name,
+            expected,
+            got,
+        } = self;
+        write!(f, "{name}: expected {expected}, got {got}")
+    }
+}
+
+/// How a comparison ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// All is equal.
+    Equal,
+    /// Something differs.
+    Different,
+    /// Something could not be compared.
+    Incomparable,
+}
+
+impl Outcome {
+    /// The exit code, as `diff` and `cmp` have it.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Self::Equal => 0,
+            Self::Different => 1,
+            Self::Incomparable => 2,
+        }
+    }
+}
+
+/// Compares two files or two folders, and tells what differs on `out`; what could not be compared
+/// goes to standard error. With `report` it is shown in an HTML file, too.
+///
+/// # Errors
+/// When `out` or the report can't be written, or the user stopped it.
+pub fn run(
+    a: &Path,
+    b: &Path,
+    report: Option<&Path>,
+    out: &mut impl Write,
+) -> anyhow::Result<Outcome> {
+    let mut findings = Findings {
+        report: report.map(|_| Report::between(a, b)),
+        out,
+        pairs: 0,
+        different: 0,
+        incomparable: 0,
+        pixels: 0,
+    };
+    match (a.is_dir(), b.is_dir()) {
+        (true, true) => findings.folders(a, b)?,
+        (false, false) => findings.files(a, b)?,
+        (a_is_folder, _) => {
+            let (folder, other) = if a_is_folder { (a, b) } else { (b, a) };
+            let why = match other.metadata() {
+                Ok(_) => format!(
+                    "{} is a folder and {} is none; give two files or two folders",
+                    folder.display(),
+                    other.display()
+                ),
+                Err(error) => format!("{}: it cannot be read: {error}", other.display()),
+            };
+            findings.incomparable(&other.display().to_string(), &why);
+        }
+    }
+    let outcome = findings.outcome();
+    if let (Some(html), Some(report)) = (report, findings.report) {
+        report.write(html)?;
+        say(format_args!("the report: {}", html.display()));
+    }
+    Ok(outcome)
+}
+
+/// What a comparison has found so far.
+struct Findings<'a, W> {
+    /// If one is asked for: it keeps what differs.
+    report: Option<Report>,
+    out: &'a mut W,
+    pairs: usize,
+    different: usize,
+    incomparable: usize,
+    pixels: usize,
+}
+
+impl<W: Write> Findings<'_, W> {
+    fn files(&mut self, a: &Path, b: &Path) -> anyhow::Result<()> {
+        let (from, to) = (a.display(), b.display());
+        let name = match (a.file_name(), b.file_name()) {
+            (Some(a), Some(b)) if a != b => format!("{} and {}", a.display(), b.display()),
+            (_, Some(b)) => b.display().to_string(),
+            (_, None) => to.to_string(),
+        };
+        let differs = format!("{to} differs from {from}");
+        self.pair(&name, &differs, &format!("{from} and {to}"), a, b)?;
+        if self.outcome() == Outcome::Equal {
+            writeln!(self.out, "equal: {from} and {to}, {} pixels", self.pixels)?;
+        }
+        Ok(())
+    }
+
+    fn folders(&mut self, a: &Path, b: &Path) -> anyhow::Result<()> {
+        let mut names = [BTreeSet::new(), BTreeSet::new()];
+        for (names, folder) in names.iter_mut().zip([a, b]) {
+            match list(folder) {
+                Ok(list) => *names = list,
+                Err(error) => {
+                    let folder = folder.display().to_string();
+                    let why = format!("{folder}: it cannot be read: {error}");
+                    self.incomparable(&folder, &why);
+                    return Ok(());
+                }
+            }
+        }
+        let [in_a, in_b] = &names;
+        for name in in_a | in_b {
+            if child::interrupted() {
+                return Err(child::Interrupted.into());
+            }
+            let shown = name.display().to_string();
+            let lacks = match (in_a.contains(&name), in_b.contains(&name)) {
+                (true, false) => Some((a, b)),
+                (false, _) => Some((b, a)),
+                (true, true) => None,
+            };
+            if let Some((has, lacks)) = lacks {
+                let (has, lacks) = (has.display(), lacks.display());
+                self.pairs += 1;
+                self.incomparable(&shown, &format!("{shown} is in {has}, {lacks} lacks it"));
+                continue;
+            }
+            let differs = format!("{shown} differs");
+            self.pair(&shown, &differs, &shown, &a.join(&name), &b.join(&name))?;
+        }
+        let pairs = self.pairs;
+        if pairs == 0 {
+            let (a, b) = (a.display().to_string(), b.display());
+            let why = format!("there is nothing to compare: no .dump and no .png in {a} and {b}");
+            self.incomparable(&a, &why);
+            return Ok(());
+        }
+        let s = if pairs == 1 { "" } else { "s" };
+        if self.outcome() == Outcome::Equal {
+            writeln!(self.out, "equal: {pairs} pair{s}, {} pixels", self.pixels)?;
+            return Ok(());
+        }
+        write!(self.out, "{} of {pairs} pair{s} differ", self.different)?;
+        if self.different == 1 {
+            write!(self.out, "s")?;
+        }
+        if self.incomparable > 0 {
+            write!(self.out, ", {} could not be compared", self.incomparable)?;
+        }
+        Ok(writeln!(self.out)?)
+    }
+
+    /// Compares two files. `differs` begins the line that tells the difference, `both` names the
+    /// two where they can't be compared.
+    fn pair(
+        &mut self,
+        name: &str,
+        differs: &str,
+        both: &str,
+        a: &Path,
+        b: &Path,
+    ) -> anyhow::Result<()> {
+        self.pairs += 1;
+        let (expected, got) = match (Subject::read(a), Subject::read(b)) {
+            (Ok(expected), Ok(got)) => (expected, got),
+            (expected, got) => {
+                let errors = [expected.err(), got.err()];
+                let errors: Vec<_> = errors.iter().flatten().map(|e| format!("{e:#}")).collect();
+                for error in &errors {
+                    say(format_args!("error: {error}"));
+                }
+                self.count_incomparable(name, &errors.join("; "));
+                return Ok(());
+            }
+        };
+        match compare(&expected, &got) {
+            Ok(None) => {
+                self.pixels += match (&expected, &got) {
+                    (Subject::Picture(picture), _) | (_, Subject::Picture(picture)) => {
+                        picture.pixels.len()
+                    }
+                    (Subject::Dump(dump), _) => dump.pixels.len(),
+                };
+                if let Some(report) = &mut self.report {
+                    report.add_equal();
+                }
+            }
+            Ok(Some(difference)) => {
+                writeln!(self.out, "{differs}: {difference}")?;
+                self.different += 1;
+                if let Some(report) = &mut self.report {
+                    report.add(name, &expected, &got, &difference);
+                }
+            }
+            Err(why) => self.incomparable(name, &format!("{both} can't be compared: {why:#}")),
+        }
+        Ok(())
+    }
+
+    fn incomparable(&mut self, name: &str, why: &str) {
+        say(format_args!("error: {why}"));
+        self.count_incomparable(name, why);
+    }
+
+    fn count_incomparable(&mut self, name: &str, why: &str) {
+        self.incomparable += 1;
+        if let Some(report) = &mut self.report {
+            report.add_incomparable(name, why);
+        }
+    }
+
+    fn outcome(&self) -> Outcome {
+        match (self.incomparable, self.different) {
+            (0, 0) => Outcome::Equal,
+            (0, _) => Outcome::Different,
+            _ => Outcome::Incomparable,
+        }
+    }
+}
+
+/// The names of the dumps and PNGs in a folder.
+fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
+    let mut names = BTreeSet::new();
+    for entry in fs::read_dir(folder)? {
+        let name = entry?.file_name();
+        let ending = Path::new(&name).extension();
+        if ending.is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known)) {
+            names.insert(name);
+        }
+    }
+    Ok(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use link::Picture;
+    use link::dump::Header;
+
+    use super::*;
+
+    /// A palette of 256 colours.
+    fn palette() -> modex::Palette {
+        std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8])
+    }
+
+    fn dump(content: Content) -> Dump {
+        let pixels = match content {
+            Content::Page => 320 * 240,
+            Content::Memory => 4 * PLANE_BYTES,
+        };
+        Dump {
+            header: Header {
+                content,
+                scene: "ball".into(),
+                picture: Some(Picture::Frame(480)),
+                start: 0x4B00,
+                width: 320,
+                height: 240,
+            },
+            palette: palette(),
+            pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
+        }
+    }
+
+    /// What [`compare`] says of a dump and of another that `change` has been at.
+    fn told(content: Content, change: impl FnOnce(&mut Dump)) -> String {
+        let expected = dump(content);
+        let mut got = expected.clone();
+        change(&mut got);
+        let [expected, got] = [expected, got].map(Subject::Dump);
+        match compare(&expected, &got) {
+            Ok(None) => "equal".into(),
+            Ok(Some(difference)) => difference.to_string(),
+            Err(why) => format!("error: {why:#}"),
+        }
+    }
+
+    #[test]
+    fn a_page_is_told_by_its_first_pixel_their_number_and_their_box() {
+        assert_eq!(told(Content::Page, |_| {}), "equal");
+        let one = told(Content::Page, |got| got.pixels[12 * 320 + 33] ^= 0xFF);
+        assert_eq!(
+            one,
+            "1 of 76800 pixels differs, first plane 1, x 33, y 12: expected 6c, got 93"
+        );
+        let three = told(Content::Page, |got| {
+            for (x, y) in [(319, 12), (2, 100), (40, 239)] {
+                got.pixels[y * 320 + x] += 1;
+            }
+        });
+        assert_eq!(
+            three,
+            "3 of 76800 pixels differ, first plane 3, x 319, y 12: expected 8f, got 90; \
+             all in x 2..319, y 12..239, ends included"
+        );
+        let all = told(Content::Page, |got| {
+            got.pixels.iter_mut().for_each(|p| *p += 1);
+        });
+        assert!(
+            all.starts_with("76800 of 76800 pixels differ, first plane 0, x 0, y 0: "),
+            "{all}"
+        );
+        assert!(all.ends_with("all in x 0..319, y 0..239, ends included"));
+    }
+
+    #[test]
+    fn memory_is_told_by_plane_address_and_page() {
+        assert_eq!(told(Content::Memory, |_| {}), "equal");
+        let at = |plane: usize, address: usize| 4 * address + plane;
+        let some = told(Content::Memory, |got| {
+            // The last bytes of page 0 and of memory, and two of page 2; the first is not plane 0's.
+            for i in [
+                at(3, 0x4AFF),
+                at(0, 0x9600),
+                at(2, 0x9600 + 80),
+                at(0, 0xFFFF),
+            ] {
+                got.pixels[i] ^= 1;
+            }
+        });
+        assert_eq!(
+            some,
+            "4 of 262144 bytes differ, first plane 3, address 4aff (page 0, x 319, y 239): \
+             expected f4, got f5; in plane 0: 2, 1: 0, 2: 1, 3: 1; in page 0: 1; in page 2: 2; \
+             past the last page: 1"
+        );
+        let past = told(Content::Memory, |got| got.pixels[at(1, 0xE100)] ^= 1);
+        assert!(
+            past.contains("first plane 1, address e100 (past the last page): "),
+            "{past}"
+        );
+        let before = told(Content::Memory, |got| got.pixels[at(3, 0xE0FF)] ^= 1);
+        assert!(before.contains("e0ff (page 2, x 319, y 239)"), "{before}");
+    }
+
+    #[test]
+    fn palette_and_header_are_told_for_themselves() {
+        let palette = told(Content::Page, |got| {
+            got.palette[3] = [0x2A, 0x1C, 0x0F];
+            got.palette[255][0] ^= 1;
+        });
+        assert_eq!(
+            palette,
+            "2 of 256 palette entries differ, first 03: expected 000303, got 2a1c0f"
+        );
+        let start = told(Content::Page, |got| got.header.start = 0);
+        assert_eq!(start, "start: expected 4b00, got 0000");
+        let all = told(Content::Memory, |got| {
+            got.pixels[0] = 9;
+            got.palette[0] = [1, 1, 1];
+            got.header.scene = "cube".into();
+            got.header.picture = None;
+        });
+        assert_eq!(
+            all,
+            "1 of 262144 bytes differs, first plane 0, address 0000 (page 0, x 0, y 0): \
+             expected 00, got 09; in plane 0: 1, 1: 0, 2: 0, 3: 0; in page 0: 1; \
+             1 of 256 palette entries differs, first 00: expected 000000, got 010101; \
+             scene: expected ball, got cube; picture: expected 480, got none"
+        );
+    }
+
+    #[test]
+    fn dumps_of_other_content_or_size_are_not_compared() {
+        let content = told(Content::Page, |got| *got = dump(Content::Memory));
+        assert_eq!(
+            content,
+            "error: expected is a dump of a page, got one of all memory; take both alike"
+        );
+        let size = told(Content::Page, |got| got.header.height = 200);
+        assert_eq!(size, "error: expected is 320 x 240, got 320 x 200");
+    }
+
+    #[test]
+    fn a_dump_is_compared_with_a_picture_as_a_picture() {
+        for content in [Content::Page, Content::Memory] {
+            let dump = dump(content);
+            let mut picture = dump.picture();
+            let dump = Subject::Dump(dump);
+            let same = Subject::Picture(picture.clone());
+            assert_eq!(compare(&dump, &same).unwrap(), None);
+            assert_eq!(compare(&same, &dump).unwrap(), None);
+            picture.pixels[321] ^= 1;
+            let difference = compare(&Subject::Picture(picture), &dump);
+            let pixels = difference.unwrap().unwrap().pixels.unwrap();
+            assert_eq!((pixels.count, pixels.of), (1, 320 * 240));
+            assert_eq!(
+                pixels.first,
+                Place {
+                    plane: 1,
+                    x: 1,
+                    y: 1,
+                    memory: None
+                }
+            );
+        }
+    }
+
+    #[test]
+    fn a_pictures_palette_may_differ_but_not_be_in_another_order() {
+        let picture = dump(Content::Page).picture();
+        let with = |change: &dyn Fn(&mut Vec<Rgb6>)| {
+            let mut other = picture.clone();
+            change(&mut other.palette);
+            let subject = Subject::Picture(picture.clone());
+            compare(&subject, &Subject::Picture(other))
+        };
+        let error = with(&|palette| palette.swap(3, 200)).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "the palettes hold the same colours in another order (entry 03: expected 000303, \
+             got 320800); indices can't be compared"
+        );
+        let palette = |difference: anyhow::Result<Option<Difference>>| {
+            difference.unwrap().unwrap().palette.unwrap()
+        };
+        let changed = palette(with(&|palette| palette[200] = [63, 63, 63]));
+        assert_eq!((changed.first, changed.count), (200, 1));
+        // Entries that nothing uses, gone: those before them can still be compared.
+        let shorter = palette(with(&|palette| palette.truncate(253)));
+        assert_eq!(
+            shorter.to_string(),
+            "3 of 256 palette entries differ, first fd: expected 3f3d01, got nothing"
+        );
+    }
+}

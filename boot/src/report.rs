@@ -1,0 +1,766 @@
+//! What differs, to look at: an HTML file that needs no network, and the pictures beside it.
+//!
+//! `FILE.html` comes with a folder `FILE-files`: for each pair that differs the expected picture,
+//! the one that was got, and their difference as PNGs, and both dumps. The two together can be
+//! moved, zipped or uploaded. What an earlier report has left in the folder stays, and is not
+//! linked to.
+
+use std::collections::HashSet;
+use std::ffi::OsStr;
+use std::fmt::{self, Write as _};
+use std::fs;
+use std::io::Write as _;
+use std::os::unix::ffi::OsStrExt;
+use std::path::Path;
+
+use anyhow::Context;
+use link::Content;
+use modex::Rgb6;
+
+use crate::aside;
+use crate::diff::{Bounds, Colour, Difference, Shape, Subject, colour, differing_entries};
+use crate::dump::Dump;
+use crate::indexed::{Indexed, widen};
+use crate::screen::Screen;
+
+const STYLE: &str = include_str!("report.css");
+const SCRIPT: &str = include_str!("report.js");
+
+/// How many times as large as they are the pictures are shown, where there is room.
+const SCALE: usize = 3;
+/// The width in CSS pixels that smaller pictures are brought up to.
+const WIDTH: usize = SCALE * modex::WIDTH;
+/// Differing pixels that are listed with their values.
+const LISTED: usize = 16;
+/// Longest part of a pair's name in the names of its files.
+const MAX_NAME: usize = 80;
+
+// The difference image's colours; report.css has them, too, for the legend.
+
+/// Differing pixels, from a difference that is hardly seen to the largest there is.
+const NEAR: [u8; 3] = [0xFF, 0xE0, 0x3A];
+const FAR: [u8; 3] = [0xFF, 0x1F, 0x6B];
+/// Another index that has the same colour.
+const SAME_COLOUR: [u8; 3] = [0x20, 0xD5, 0xFF];
+/// The same index that has another colour.
+const SAME_INDEX: [u8; 3] = [0x8F, 0x7B, 0xFF];
+
+/// Collects the pairs that differ, and writes them down.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    between: Option<[String; 2]>,
+    equal: usize,
+    different: Vec<Pair>,
+    incomparable: Vec<[String; 2]>,
+}
+
+/// A pair that differs.
+#[derive(Clone, Debug)]
+struct Pair {
+    name: String,
+    expected: Subject,
+    got: Subject,
+    difference: Difference,
+}
+
+/// A file of the report's folder.
+type Make<'a> = Box<dyn Fn(&mut fs::File) -> anyhow::Result<()> + 'a>;
+
+impl Report {
+    /// A report of nothing yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// A report of nothing yet, that names what is compared.
+    pub fn between(expected: &Path, got: &Path) -> Self {
+        Self {
+            between: Some([expected, got].map(|path| path.display().to_string())),
+            ..Self::default()
+        }
+    }
+
+    /// Adds a pair that differs.
+    pub fn add(&mut self, name: &str, expected: &Subject, got: &Subject, difference: &Difference) {
+        self.different.push(Pair {
+            name: name.into(),
+            expected: expected.clone(),
+            got: got.clone(),
+            difference: difference.clone(),
+        });
+    }
+
+    /// Counts a pair that is equal.
+    pub fn add_equal(&mut self) {
+        self.equal += 1;
+    }
+
+    /// Adds a pair that could not be compared.
+    pub fn add_incomparable(&mut self, name: &str, why: &str) {
+        self.incomparable.push([name.into(), why.into()]);
+    }
+
+    /// Writes the folder's files, and then the HTML file: it is whole or not there.
+    ///
+    /// # Errors
+    /// A file that can't be written.
+    pub fn write(&self, html: &Path) -> anyhow::Result<()> {
+        let name = || format!("{} is no name for a report", html.display());
+        let mut folder_name = html.file_stem().with_context(name)?.to_owned();
+        folder_name.push("-files");
+        let folder = html.with_file_name(&folder_name);
+        if !self.different.is_empty() && !folder.is_dir() {
+            let context = || format!("the folder {} cannot be made", folder.display());
+            fs::create_dir(&folder).with_context(context)?;
+        }
+        let url = url(&folder_name);
+        let mut page = self.head();
+        let mut names = Names::default();
+        for (i, pair) in self.different.iter().enumerate() {
+            let name = names.take(&pair.name);
+            let put = |ending: &str, make: Make| {
+                let path = folder.join(format!("{name}-{ending}"));
+                aside::write(&path, make)
+            };
+            pair.section(&mut page, i, &format!("{url}/{name}"), &put)?;
+        }
+        page += "</main>\n";
+        if !self.different.is_empty() {
+            let _ = writeln!(page, "<script>\n{SCRIPT}</script>");
+        }
+        page += "</body>\n</html>\n";
+        aside::write(html, |file| Ok(file.write_all(page.as_bytes())?))
+    }
+
+    fn title(&self) -> String {
+        let (different, equal) = (self.different.len(), self.equal);
+        let all = different + equal + self.incomparable.len();
+        let title = match (different, all) {
+            (0, all) if all == equal => "Nothing differs".into(),
+            (0, all) => format!("None of {all} pairs differs"),
+            (1, 1) => "1 pair differs".into(),
+            (1, all) => format!("1 of {all} pairs differs"),
+            (n, all) => format!("{n} of {all} pairs differ"),
+        };
+        match self.incomparable.len() {
+            0 => title,
+            1 if all == 1 => "It could not be compared".into(),
+            n => format!("{title}, {n} could not be compared"),
+        }
+    }
+
+    /// All that comes before the pairs.
+    fn head(&self) -> String {
+        let title = escape(&self.title());
+        let verdict = match (self.different.len(), self.incomparable.len()) {
+            (0, 0) => "equal",
+            _ => "different",
+        };
+        let mut page = format!(
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n\
+             <title>{title} - Crystal Ball</title>\n<style>\n{STYLE}</style>\n</head>\n\
+             <body id=\"top\">\n<header class=\"top {verdict}\">\n\
+             <p class=\"brand\">Crystal Ball <span>diff</span></p>\n<h1>{title}</h1>\n"
+        );
+        if let Some(between) = &self.between {
+            let [expected, got] = between.each_ref().map(|path| escape(path));
+            let _ = writeln!(
+                page,
+                "<p class=\"between\"><span>expected</span> <code>{expected}</code> \
+                 <span>got</span> <code>{got}</code></p>"
+            );
+        }
+        match (self.different.len(), self.equal) {
+            (0, 1) => page += "<p>The pair is equal.</p>\n",
+            (0, 2..) => {
+                let _ = writeln!(page, "<p>{} pairs are equal.</p>", self.equal);
+            }
+            _ => {}
+        }
+        page += "</header>\n";
+        if !self.different.is_empty() {
+            page += LEGEND;
+        }
+        page += "<main>\n";
+        if !self.incomparable.is_empty() {
+            page += "<section class=\"card errors\">\n<h2>Could not be compared</h2>\n<dl>\n";
+            for [name, why] in &self.incomparable {
+                let (name, why) = (escape(name), escape(why));
+                let _ = writeln!(page, "<dt>{name}</dt><dd>{why}</dd>");
+            }
+            page += "</dl>\n</section>\n";
+        }
+        if self.different.len() > 1 {
+            self.contents(&mut page);
+        }
+        page
+    }
+
+    /// The table of contents.
+    fn contents(&self, page: &mut String) {
+        *page += "<nav class=\"card\">\n<table class=\"contents\">\n<thead><tr><th>pair</th>\
+                  <th class=\"n\">pixels that differ</th><th></th><th class=\"n\">palette entries</th>\
+                  <th>header</th></tr></thead>\n<tbody>\n";
+        for (i, pair) in self.different.iter().enumerate() {
+            let Difference {
+                pixels,
+                palette,
+                fields,
+            } = &pair.difference;
+            let dash = "<span class=\"none\">&ndash;</span>";
+            let (count, share) = match pixels {
+                None => (dash.into(), String::new()),
+                Some(p) => (p.count.to_string(), percent(p.count, p.of)),
+            };
+            let palette = palette.map_or(dash.into(), |palette| palette.count.to_string());
+            let fields: Vec<_> = fields.iter().map(|field| field.name).collect();
+            let fields = match fields.is_empty() {
+                true => dash.into(),
+                false => fields.join(", "),
+            };
+            let _ = writeln!(
+                page,
+                "<tr><td><a href=\"#pair-{i}\">{}</a></td><td class=\"n\">{count}</td>\
+                 <td class=\"share\">{share}</td><td class=\"n\">{palette}</td><td>{fields}</td></tr>",
+                escape(&pair.name)
+            );
+        }
+        *page += "</tbody>\n</table>\n</nav>\n";
+    }
+}
+
+/// What the colours mean, and how large the pictures are.
+const LEGEND: &str = r#"<aside class="bar">
+<ul class="legend" aria-label="Colours of the difference images">
+<li><i class="ramp"></i>differs: near to far in colour</li>
+<li><i class="same-colour"></i>another index, the same colour</li>
+<li><i class="same-index"></i>the same index, another colour</li>
+<li><i class="same"></i>equal</li>
+<li><i class="bounds"></i>box around what differs</li>
+</ul>
+<div class="controls">
+<span class="scale" role="radiogroup" aria-label="Scale">
+<label><input type="radio" name="scale" id="fit" checked>3x if it fits</label><label><input type="radio" name="scale" id="x1">1x</label><label><input type="radio" name="scale" id="x2">2x</label><label><input type="radio" name="scale" id="x3">3x</label>
+</span>
+<label class="check"><input type="checkbox" id="boxes" checked>boxes</label>
+</div>
+</aside>
+"#;
+
+/// Two pictures to be shown side by side.
+struct View {
+    /// Of the files' names.
+    suffix: &'static str,
+    title: Option<&'static str>,
+    expected: Indexed,
+    got: Indexed,
+    shape: Shape,
+}
+
+impl Pair {
+    fn views(&self) -> Vec<View> {
+        let (expected, got) = (self.expected.picture(), self.got.picture());
+        let page = View {
+            suffix: "",
+            title: None,
+            shape: Shape {
+                width: expected.width,
+                memory: None,
+            },
+            expected: expected.into_owned(),
+            got: got.into_owned(),
+        };
+        let (Subject::Dump(expected), Subject::Dump(got)) = (&self.expected, &self.got) else {
+            return vec![page];
+        };
+        if expected.header.content != Content::Memory {
+            return vec![page];
+        }
+        let outside = {
+            let header = &expected.header;
+            let length = usize::from(header.width / 4) * usize::from(header.height);
+            let mut pixels = expected.pixels.iter().zip(&got.pixels).enumerate();
+            pixels.any(|(i, (a, b))| {
+                let behind = ((i / 4) as u16).wrapping_sub(header.start);
+                a != b && usize::from(behind) >= length
+            })
+        };
+        let memory = View {
+            suffix: "-memory",
+            title: Some("All of video memory"),
+            expected: whole(expected),
+            got: whole(got),
+            shape: Shape {
+                width: expected.header.width.into(),
+                memory: Some(expected.header.height.into()),
+            },
+        };
+        let page = View {
+            title: Some("The page on the screen"),
+            ..page
+        };
+        let shown = page.expected != page.got;
+        match (shown, outside) {
+            (_, false) => vec![page],
+            (true, true) => vec![page, memory],
+            (false, true) => vec![memory],
+        }
+    }
+
+    /// Writes the pair's files by `put`, and adds its section to the page.
+    fn section(
+        &self,
+        page: &mut String,
+        i: usize,
+        url: &str,
+        put: &dyn Fn(&str, Make) -> anyhow::Result<()>,
+    ) -> anyhow::Result<()> {
+        let name = escape(&self.name);
+        let _ = write!(
+            page,
+            "<section class=\"card pair\" id=\"pair-{i}\">\n<h2>{name} <a href=\"#top\">top</a></h2>\n\
+             <ul class=\"lines\">\n"
+        );
+        for part in self.difference.parts() {
+            let _ = writeln!(page, "<li>{}</li>", escape(&part));
+        }
+        *page += "</ul>\n";
+        let mut links = Vec::new();
+        for view in self.views() {
+            let View {
+                suffix,
+                expected,
+                got,
+                ..
+            } = &view;
+            let ending = |of: &str| format!("{of}{suffix}.png");
+            put(&ending("expected"), Box::new(|to| expected.write_png(to)))?;
+            put(&ending("got"), Box::new(|to| got.write_png(to)))?;
+            let difference = difference(expected, got);
+            put(
+                &ending("difference"),
+                Box::new(|to| difference.write_png(to)),
+            )?;
+            view.figures(page, &self.name, url);
+            links.extend(["expected", "got", "difference"].map(ending));
+        }
+        for (of, subject) in [("expected", &self.expected), ("got", &self.got)] {
+            if let Subject::Dump(dump) = subject {
+                let ending = format!("{of}.dump");
+                put(&ending, Box::new(|to| Ok(dump.write(to)?)))?;
+                links.push(ending);
+            }
+        }
+        self.list_pixels(page);
+        self.list_palette(page);
+        *page += "<p class=\"files\">Files:";
+        for ending in links {
+            let _ = write!(page, " <a href=\"{url}-{ending}\">{ending}</a>");
+        }
+        *page += "</p>\n</section>\n";
+        Ok(())
+    }
+
+    /// The first pixels that differ, and their values.
+    fn list_pixels(&self, page: &mut String) {
+        let Some(pixels) = &self.difference.pixels else {
+            return;
+        };
+        let (expected, got);
+        let (shape, a, b) = match (&self.expected, &self.got) {
+            (Subject::Dump(a), Subject::Dump(b)) => {
+                let height = usize::from(a.header.height);
+                let memory = (a.header.content == Content::Memory).then_some(height);
+                let width = a.header.width.into();
+                (Shape { width, memory }, &a.pixels[..], &b.pixels[..])
+            }
+            (a, b) => {
+                (expected, got) = (a.picture(), b.picture());
+                let width = expected.width;
+                let shape = Shape {
+                    width,
+                    memory: None,
+                };
+                (shape, &expected.pixels[..], &got.pixels[..])
+            }
+        };
+        let count = pixels.count;
+        let summary = match count {
+            1 => "Its values".into(),
+            ..=LISTED => format!("The values of all {count}"),
+            _ => format!("The values of the first {LISTED}"),
+        };
+        let at = match shape.memory {
+            Some(_) => "<th>address</th><th>page</th>",
+            None => "",
+        };
+        let _ = write!(
+            page,
+            "<details>\n<summary>{summary}</summary>\n<table class=\"values\">\n<thead><tr>\
+             <th>plane</th>{at}<th>x</th><th>y</th><th>expected</th><th>got</th></tr></thead>\n<tbody>\n"
+        );
+        let palettes = [palette(&self.expected), palette(&self.got)];
+        let differing = a.iter().zip(b).enumerate().filter(|(_, (a, b))| a != b);
+        for (i, (&a, &b)) in differing.take(LISTED) {
+            let place = shape.place(i);
+            let (mut x, mut y) = (place.x.to_string(), place.y.to_string());
+            let _ = write!(page, "<tr><td>{}</td>", place.plane);
+            if let Some(at) = place.memory {
+                let page_name = at
+                    .page
+                    .map_or("past the last".into(), |page| page.to_string());
+                let _ = write!(page, "<td>{:04x}</td><td>{page_name}</td>", at.address);
+                if at.page.is_none() {
+                    (x, y) = (String::new(), String::new());
+                }
+            }
+            let _ = write!(page, "<td>{x}</td><td>{y}</td>");
+            for (index, palette) in [a, b].into_iter().zip(palettes) {
+                let colour = palette.get(usize::from(index)).copied();
+                let _ = write!(page, "<td>{index:02x} {}</td>", Swatch(colour));
+            }
+            *page += "</tr>\n";
+        }
+        *page += "</tbody>\n</table>\n</details>\n";
+    }
+
+    /// The palette's entries that differ.
+    fn list_palette(&self, page: &mut String) {
+        let Some(colours) = &self.difference.palette else {
+            return;
+        };
+        let entries = match colours.count {
+            1 => "The palette's entry that differs".into(),
+            n => format!("The palette's {n} entries that differ"),
+        };
+        let _ = write!(
+            page,
+            "<details>\n<summary>{entries}</summary>\n<table class=\"values\">\n\
+             <thead><tr><th>entry</th><th>expected</th><th>got</th></tr></thead>\n<tbody>\n"
+        );
+        let [expected, got] = [palette(&self.expected), palette(&self.got)];
+        for entry in differing_entries(expected, got) {
+            let [expected, got] =
+                [expected, got].map(|palette| Swatch(palette.get(entry).copied()));
+            let _ = writeln!(
+                page,
+                "<tr><td>{entry:02x}</td><td>{expected}</td><td>{got}</td></tr>"
+            );
+        }
+        *page += "</tbody>\n</table>\n</details>\n";
+    }
+}
+
+impl View {
+    /// The three pictures, side by side.
+    fn figures(&self, page: &mut String, name: &str, url: &str) {
+        let (width, height) = (self.expected.width.max(1), self.expected.height.max(1));
+        if let Some(title) = self.title {
+            let _ = writeln!(page, "<h3>{title}</h3>");
+        }
+        let memory = self.shape.memory;
+        let scale = SCALE.max(WIDTH / width);
+        let kind = if memory.is_some() { " memory" } else { "" };
+        let bounds = self.bounds();
+        let _ = writeln!(
+            page,
+            "<div class=\"three{kind}\" style=\"--w:{width};--h:{height};--s:{scale}\" \
+             data-width=\"{width}\" data-height=\"{height}\" data-page=\"{}\">",
+            memory.unwrap_or(0)
+        );
+        let name = escape(name);
+        for (caption, of) in [
+            ("Expected", "expected"),
+            ("Got", "got"),
+            ("Difference", "difference"),
+        ] {
+            let source = format!("{url}-{of}{}.png", self.suffix);
+            let _ = write!(
+                page,
+                "<figure><figcaption>{caption}</figcaption><div class=\"view\"><a href=\"{source}\">\
+                 <img src=\"{source}\" alt=\"{caption}: {name}\" width=\"{width}\" height=\"{height}\" \
+                 loading=\"lazy\"></a>"
+            );
+            if let Some(lines) = memory {
+                let pages = height / lines;
+                for i in 0..=pages.min(8) {
+                    let y = 100.0 * (i * lines) as f64 / height as f64;
+                    let label = match i == pages {
+                        true => "past the last page".into(),
+                        false => format!("page {i}"),
+                    };
+                    let _ = write!(
+                        page,
+                        "<div class=\"page\" style=\"top:{y:.3}%\">{label}</div>"
+                    );
+                }
+            }
+            let _ = writeln!(page, "{bounds}</div></figure>");
+        }
+        *page += "</div>\n";
+    }
+
+    /// The box around what differs, on each page.
+    fn bounds(&self) -> String {
+        let (width, height) = (self.expected.width, self.expected.height);
+        let lines = self.shape.memory.unwrap_or(height);
+        let shape = Shape {
+            width,
+            memory: None,
+        };
+        let pages = [&self.expected, &self.got].map(|of| of.pixels.chunks((width * lines).max(1)));
+        let [expected, got] = pages;
+        let pairs = expected.zip(got).enumerate();
+        let boxes = pairs.filter_map(|(page, (expected, got))| {
+            let Bounds { x0, x1, y0, y1 } = shape.compare(expected, got)?.bounds;
+            let above = page * lines;
+            let moved = Bounds {
+                x0,
+                x1,
+                y0: above + y0,
+                y1: above + y1,
+            };
+            Some(bounds(&moved, width, height))
+        });
+        boxes.collect()
+    }
+}
+
+/// A box, as an outline over a picture.
+fn bounds(bounds: &Bounds, width: usize, height: usize) -> String {
+    let Bounds { x0, x1, y0, y1 } = *bounds;
+    let share = |part: usize, whole: usize| 100.0 * part as f64 / whole as f64;
+    format!(
+        "<div class=\"bounds\" style=\"left:{:.3}%;top:{:.3}%;width:{:.3}%;height:{:.3}%\"></div>",
+        share(x0, width),
+        share(y0, height),
+        share(x1 - x0 + 1, width),
+        share(y1 - y0 + 1, height)
+    )
+}
+
+/// All of video memory as a picture whose lines are the dump's.
+fn whole(dump: &Dump) -> Indexed {
+    let width = usize::from(dump.header.width);
+    let height = dump.pixels.len().div_ceil(width);
+    let mut pixels = dump.pixels.clone();
+    pixels.resize(width * height, 0);
+    Indexed {
+        width,
+        height,
+        palette: dump.palette.to_vec(),
+        pixels,
+    }
+}
+
+fn palette(subject: &Subject) -> &[Rgb6] {
+    match subject {
+        Subject::Dump(dump) => &dump.palette,
+        Subject::Picture(picture) => &picture.palette,
+    }
+}
+
+/// The expected picture as a dim grey one, and bright what differs from it.
+fn difference(expected: &Indexed, got: &Indexed) -> Screen {
+    let colour = |picture: &Indexed, index: u8| {
+        let colour = picture.palette.get(usize::from(index));
+        colour.copied().unwrap_or_default()
+    };
+    let pairs = expected.pixels.iter().zip(&got.pixels);
+    let pixels = pairs.map(|(&a, &b)| {
+        let (from, to) = (colour(expected, a), colour(got, b));
+        match (a == b, from == to) {
+            (true, true) => dim(from),
+            (true, false) => SAME_INDEX,
+            (false, true) => SAME_COLOUR,
+            (false, false) => between_near_and_far(from, to),
+        }
+    });
+    Screen {
+        width: expected.width,
+        height: expected.height,
+        pixels: pixels.collect(),
+    }
+}
+
+fn dim(colour: Rgb6) -> [u8; 3] {
+    let [red, green, blue] = colour.map(|part| u32::from(widen(part)));
+    let luma = (299 * red + 587 * green + 114 * blue) / 1000;
+    [(20 + luma * 100 / 255) as u8; 3]
+}
+
+fn between_near_and_far(from: Rgb6, to: Rgb6) -> [u8; 3] {
+    let parts = from.iter().zip(&to).map(|(a, b)| a.abs_diff(*b));
+    let far = i32::from(parts.max().unwrap_or(0)).min(63);
+    std::array::from_fn(|part| {
+        let (near, end) = (i32::from(NEAR[part]), i32::from(FAR[part]));
+        (near + (end - near) * far / 63) as u8
+    })
+}
+
+/// A colour and its parts; or that there is none.
+struct Swatch(Option<Rgb6>);
+
+impl fmt::Display for Swatch {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(parts) = self.0 {
+            let shown = Colour(parts.map(widen));
+            write!(f, "<i style=\"background:#{shown}\"></i>")?;
+        }
+        write!(f, "<code>{}</code>", colour(self.0))
+    }
+}
+
+/// Names of files, no two alike on any file system.
+#[derive(Default)]
+struct Names(HashSet<String>);
+
+impl Names {
+    fn take(&mut self, name: &str) -> String {
+        let mut plain = String::new();
+        for c in name.chars().take(MAX_NAME) {
+            // Neither hidden nor like an option.
+            match c {
+                'a'..='z' | 'A'..='Z' | '0'..='9' | '_' => plain.push(c),
+                '.' if !plain.is_empty() => plain.push(c),
+                _ if plain.is_empty() || plain.ends_with('-') => {}
+                _ => plain.push('-'),
+            }
+        }
+        if plain.is_empty() {
+            plain.push_str("pair");
+        }
+        let mut unique = plain.clone();
+        let mut times = 1;
+        while !self.0.insert(unique.to_lowercase()) {
+            times += 1;
+            unique = format!("{plain}-{times}");
+        }
+        unique
+    }
+}
+
+fn percent(count: usize, of: usize) -> String {
+    match 100.0 * count as f64 / of as f64 {
+        share if share < 0.01 => "&lt; 0.01 %".into(),
+        share => format!("{share:.2} %"),
+    }
+}
+
+/// Text for HTML, in an attribute's quotes too.
+fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => escaped += "&amp;",
+            '<' => escaped += "&lt;",
+            '>' => escaped += "&gt;",
+            '"' => escaped += "&quot;",
+            '\'' => escaped += "&#39;",
+            c => escaped.push(c),
+        }
+    }
+    escaped
+}
+
+/// A name as a part of a relative address.
+fn url(name: &OsStr) -> String {
+    // A name with a colon would be a scheme.
+    let mut url = String::from("./");
+    for &byte in name.as_bytes() {
+        match byte {
+            b'0'..=b'9' | b'A'..=b'Z' | b'a'..=b'z' | b'-' | b'.' | b'_' => url.push(byte.into()),
+            _ => {
+                let _ = write!(url, "%{byte:02X}");
+            }
+        }
+    }
+    url
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diff::compare;
+
+    fn picture(pixels: &[u8]) -> Indexed {
+        Indexed {
+            width: 4,
+            height: pixels.len() / 4,
+            palette: vec![[0; 3], [63; 3], [63; 3], [0, 0, 1]],
+            pixels: pixels.to_vec(),
+        }
+    }
+
+    #[test]
+    fn the_difference_shows_how_far_the_colours_are() {
+        let expected = picture(&[0, 0, 1, 1]);
+        let mut got = picture(&[1, 3, 2, 1]);
+        let pixels = |got: &Indexed| difference(&expected, got).pixels;
+        let [far, near, same, equal] = pixels(&got)[..] else {
+            panic!()
+        };
+        assert_eq!(far, FAR);
+        assert!(near.iter().zip(&NEAR).all(|(a, b)| a.abs_diff(*b) < 5));
+        assert_eq!(same, SAME_COLOUR);
+        assert_eq!(equal, [120; 3], "dim");
+        got.palette[1] = [0, 63, 63];
+        assert_eq!(pixels(&got)[3], SAME_INDEX);
+    }
+
+    #[test]
+    fn the_legend_has_the_images_colours() {
+        for (name, [red, green, blue]) in [
+            ("near", NEAR),
+            ("far", FAR),
+            ("same-colour", SAME_COLOUR),
+            ("same-index", SAME_INDEX),
+        ] {
+            let line = format!("--{name}: #{red:02x}{green:02x}{blue:02x};");
+            assert!(STYLE.contains(&line), "{line}");
+        }
+    }
+
+    #[test]
+    fn names_are_harmless_wherever_they_stand() {
+        let folder = tempfile::tempdir().unwrap();
+        let html = folder.path().join("a b%#é.html");
+        let (expected, got) = (picture(&[0; 8]), picture(&[1; 8]));
+        let [expected, got] = [expected, got].map(Subject::Picture);
+        let difference = compare(&expected, &got).unwrap().unwrap();
+        let mut report = Report::new();
+        for name in ["../<b>&\"'/x", "../<B>&\"'/x", "", &"long ".repeat(99)] {
+            report.add(name, &expected, &got, &difference);
+        }
+        report.add_incomparable("<i>", "<u>");
+        report.write(&html).unwrap();
+        let page = fs::read_to_string(&html).unwrap();
+        for bad in ["<b>", "<B>", "<i>", "<u>", "'/x"] {
+            assert!(!page.contains(bad), "{bad}");
+        }
+        assert!(page.contains("<dt>&lt;i&gt;</dt><dd>&lt;u&gt;</dd>"));
+        assert!(page.contains("../&lt;b&gt;&amp;&quot;&#39;/x"));
+        // Every file that is named is there, and the other way round.
+        let files = folder.path().join("a b%#é-files");
+        let files = fs::read_dir(files).unwrap();
+        let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());
+        let files: HashSet<_> = files.collect();
+        let named = page.split('"').filter_map(|part| {
+            let name = part.strip_prefix("./a%20b%25%23%C3%A9-files/")?;
+            Some(name.to_owned())
+        });
+        assert_eq!(named.collect::<HashSet<_>>(), files);
+        assert_eq!(files.len(), 4 * 3);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    #[test]
+    fn nothing_is_fetched_from_elsewhere() {
+        for text in [STYLE, SCRIPT, LEGEND] {
+            assert!(!text.contains("//") || text == SCRIPT && !text.contains("://"));
+            assert!(!text.contains("@import"));
+        }
+    }
+}

@@ -1,0 +1,508 @@
+//! `diff` from the outside: what the program says, where, and by which exit code.
+
+use std::fs;
+use std::io::Cursor;
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+use crystal_ball::dump::Dump;
+use crystal_ball::indexed::Indexed;
+use crystal_ball::screen::Screen;
+use link::dump::{Header, PLANE_BYTES};
+use link::{Content, Picture};
+use tempfile::TempDir;
+
+/// A folder of files to compare; the program runs in it.
+struct World(TempDir);
+
+impl World {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> std::path::PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Writes a file, and the folder that it is in.
+    fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
+        let path = self.path(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, bytes).unwrap();
+    }
+
+    fn read(&self, name: &str) -> String {
+        String::from_utf8(fs::read(self.path(name)).unwrap()).unwrap()
+    }
+
+    fn diff(&self, arguments: &[&str]) -> Said {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_crystal-ball"));
+        program.arg("diff").args(arguments).stdin(Stdio::null());
+        let Output {
+            status,
+            stdout,
+            stderr,
+        } = program.current_dir(self.0.path()).output().unwrap();
+        Said {
+            code: status.code(),
+            out: String::from_utf8(stdout).unwrap(),
+            errors: String::from_utf8(stderr).unwrap(),
+        }
+    }
+}
+
+/// What the program said.
+#[derive(Debug, PartialEq, Eq)]
+struct Said {
+    code: Option<i32>,
+    out: String,
+    errors: String,
+}
+
+#[track_caller]
+fn says(said: Said, code: i32, out: &str, errors: &str) {
+    let expected = Said {
+        code: Some(code),
+        out: out.into(),
+        errors: errors.into(),
+    };
+    assert_eq!(said, expected);
+}
+
+fn dump(content: Content) -> Dump {
+    let pixels = match content {
+        Content::Page => 320 * 240,
+        Content::Memory => 4 * PLANE_BYTES,
+    };
+    Dump {
+        header: Header {
+            content,
+            scene: "ball".into(),
+            picture: Some(Picture::Frame(480)),
+            start: 0x4B00,
+            width: 320,
+            height: 240,
+        },
+        palette: std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8]),
+        pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
+    }
+}
+
+/// A page's dump as a file, after `change`.
+fn page(change: impl FnOnce(&mut Dump)) -> Vec<u8> {
+    file(Content::Page, change)
+}
+
+fn file(content: Content, change: impl FnOnce(&mut Dump)) -> Vec<u8> {
+    let (mut dump, mut bytes) = (dump(content), Vec::new());
+    change(&mut dump);
+    dump.write(&mut bytes).unwrap();
+    bytes
+}
+
+/// A PNG as a file, after `change`.
+fn png(change: impl FnOnce(&mut Indexed)) -> Vec<u8> {
+    let (mut picture, mut bytes) = (dump(Content::Page).picture(), Vec::new());
+    change(&mut picture);
+    picture.write_png(&mut bytes).unwrap();
+    bytes
+}
+
+const FIRST: &str = "1 of 76800 pixels differs, first plane 1, x 1, y 1: expected 46, got 47";
+
+fn one_pixel(dump: &mut Dump) {
+    dump.pixels[321] ^= 1;
+}
+
+#[test]
+fn equal_files_are_equal() {
+    let world = World::new();
+    world.put("a.dump", page(|_| {}));
+    // As a terminal leaves it.
+    let text = String::from_utf8(page(|_| {})).unwrap();
+    world.put("b.dump", text.replace('\n', "\r\n"));
+    world.put("a.png", png(|_| {}));
+    world.put("all.dump", file(Content::Memory, |_| {}));
+    for (a, b, pixels) in [
+        ("a.dump", "b.dump", 76_800),
+        ("a.png", "a.png", 76_800),
+        ("a.png", "a.dump", 76_800),
+        ("all.dump", "all.dump", 262_144),
+    ] {
+        let line = format!("equal: {a} and {b}, {pixels} pixels\n");
+        says(world.diff(&[a, b]), 0, &line, "");
+    }
+}
+
+#[test]
+fn what_differs_is_told_in_a_line() {
+    let world = World::new();
+    world.put("a", page(|_| {}));
+    world.put("pixel", page(one_pixel));
+    world.put("elsewhere", page(|dump| dump.header.start = 0));
+    world.put("colour", page(|dump| dump.palette[3] = [0x2A, 0x1C, 0x0F]));
+    world.put("a.png", png(|_| {}));
+    world.put("pixel.png", png(|picture| picture.pixels[321] ^= 1));
+    world.put("all", file(Content::Memory, |_| {}));
+    let at = 4 * 0x4B50 + 2;
+    world.put(
+        "byte",
+        file(Content::Memory, |dump| dump.pixels[at] ^= 0x80),
+    );
+    let palette = "1 of 256 palette entries differs, first 03: expected 000303, got 2a1c0f";
+    for (a, b, line) in [
+        ("a", "pixel", FIRST),
+        ("a", "elsewhere", "start: expected 4b00, got 0000"),
+        ("a", "colour", palette),
+        ("a.png", "pixel.png", FIRST),
+        ("a.png", "pixel", FIRST),
+        ("a", "pixel.png", FIRST),
+        (
+            "all",
+            "byte",
+            "1 of 262144 bytes differs, first plane 2, address 4b50 (page 1, x 2, y 1): \
+             expected 41, got c1; in plane 0: 0, 1: 0, 2: 1, 3: 0; in page 1: 1",
+        ),
+    ] {
+        let line = format!("{b} differs from {a}: {line}\n");
+        says(world.diff(&[a, b]), 1, &line, "");
+    }
+}
+
+#[test]
+fn folders_are_matched_by_name_and_all_of_it_is_told() {
+    let world = World::new();
+    for folder in ["a", "b"] {
+        world.put(&format!("{folder}/1.dump"), page(|_| {}));
+        world.put(&format!("{folder}/2.png"), png(|_| {}));
+        world.put(&format!("{folder}/{folder}.txt"), "not compared");
+        world.put(&format!("{folder}/sub/{folder}.dump"), "not compared");
+    }
+    let equal = "equal: 2 pairs, 153600 pixels\n";
+    says(world.diff(&["a", "b"]), 0, equal, "");
+    world.put("b/2.png", png(|picture| picture.pixels[321] ^= 1));
+    let different = format!("2.png differs: {FIRST}\n1 of 2 pairs differs\n");
+    says(world.diff(&["a", "b/"]), 1, &different, "");
+    // What is missing comes first, and the rest is compared all the same.
+    world.put("a/0.dump", page(|_| {}));
+    world.put("b/1.png", png(|_| {}));
+    says(
+        world.diff(&["a", "b"]),
+        2,
+        &format!("2.png differs: {FIRST}\n1 of 4 pairs differs, 2 could not be compared\n"),
+        "error: 0.dump is in a, b lacks it\nerror: 1.png is in b, a lacks it\n",
+    );
+}
+
+#[test]
+fn nothing_to_compare_is_not_equal() {
+    let world = World::new();
+    world.put("a/x.txt", "");
+    world.put("b/x.txt", "");
+    says(
+        world.diff(&["a", "b"]),
+        2,
+        "",
+        "error: there is nothing to compare: no .dump and no .png in a and b\n",
+    );
+    world.put("file", page(|_| {}));
+    let why = "error: a is a folder and file is none; give two files or two folders\n";
+    says(world.diff(&["a", "file"]), 2, "", why);
+    says(world.diff(&["file", "a"]), 2, "", why);
+    let gone = "error: gone: it cannot be read: No such file or directory (os error 2)\n";
+    says(world.diff(&["a", "gone"]), 2, "", gone);
+    says(world.diff(&["gone", "a"]), 2, "", gone);
+    assert_eq!(world.diff(&["a"]).code, Some(2), "wrong usage");
+}
+
+#[test]
+fn what_cannot_be_compared_is_told_with_words() {
+    let world = World::new();
+    world.put("a", page(|_| {}));
+    world.put("all", file(Content::Memory, |_| {}));
+    world.put(
+        "low",
+        page(|dump| {
+            dump.header.height = 200;
+            dump.pixels.truncate(320 * 200);
+        }),
+    );
+    world.put("a.png", png(|_| {}));
+    world.put("order.png", png(|picture| picture.palette.swap(3, 200)));
+    let order = "the palettes hold the same colours in another order (entry 03: expected 000303, \
+                 got 320800); indices can't be compared";
+    for (a, b, why) in [
+        (
+            "a",
+            "all",
+            "expected is a dump of a page, got one of all memory; take both alike",
+        ),
+        ("a", "low", "expected is 320 x 240, got 320 x 200"),
+        ("a.png", "low", "expected is 320 x 240, got 320 x 200"),
+        ("a.png", "order.png", order),
+        ("a", "order.png", order),
+    ] {
+        let error = format!("error: {a} and {b} can't be compared: {why}\n");
+        says(world.diff(&[a, b]), 2, "", &error);
+    }
+}
+
+#[test]
+fn files_that_are_no_dumps_or_pictures_are_told_apart() {
+    let world = World::new();
+    let good = String::from_utf8(page(|_| {})).unwrap();
+    let lines: Vec<_> = good.split_inclusive('\n').collect();
+    let framed = |text: &str| {
+        let mut line = Vec::new();
+        link::write_line(format_args!("{text}"), |bytes| {
+            line.extend_from_slice(bytes);
+        });
+        String::from_utf8(line).unwrap()
+    };
+    let picture = png(|_| {});
+    let mut huge = picture.clone();
+    // The header's size and its checksum.
+    huge[16..24].copy_from_slice(&[0x7F, 0xFF, 0xFF, 0xFF, 0x7F, 0xFF, 0xFF, 0xFF]);
+    let mut checksum = link::Checksum::new();
+    checksum.add(&huge[12..29]);
+    huge[29..33].copy_from_slice(&checksum.value().to_be_bytes());
+    let mut rgb = Vec::new();
+    let screen = Screen {
+        width: 1,
+        height: 1,
+        pixels: vec![[1, 2, 3]],
+    };
+    screen.write_png(&mut rgb).unwrap();
+    let no_dump = "nor is it a PNG; `diff` compares dumps and indexed PNGs";
+    for (name, bytes, words) in [
+        ("empty", Vec::new(), ["line 1: it is no dump", no_dump]),
+        (
+            "text",
+            b"Hello!\n".to_vec(),
+            ["line 1: it is no dump", no_dump],
+        ),
+        (
+            "binary",
+            (0..=255).cycle().take(99_999).collect(),
+            ["line 1: it is no dump", no_dump],
+        ),
+        (
+            "later",
+            good.replacen(lines[0], &framed("crystal-ball dump 2"), 1)
+                .into(),
+            [
+                "line 1: it is a dump of version 2; this program reads version 1",
+                "take the dump again",
+            ],
+        ),
+        (
+            "cut",
+            lines[..100].concat().into(),
+            ["line 101: it is cut short", "take the dump again"],
+        ),
+        (
+            "cut in a line",
+            good[..99_999].into(),
+            ["line 171: it is cut short", "take the dump again"],
+        ),
+        (
+            "edited",
+            good.replacen("line 007 e8", "line 007 e9", 1).into(),
+            ["line 30: ", "take the dump again"],
+        ),
+        (
+            "cut.png",
+            picture[..picture.len() / 2].into(),
+            ["it is no whole PNG", ""],
+        ),
+        (
+            "end.png",
+            picture[..picture.len() - 12].into(),
+            ["it is no whole PNG", ""],
+        ),
+        ("head.png", picture[..20].into(), ["it is no whole PNG", ""]),
+        (
+            "rgb.png",
+            rgb,
+            [
+                "its pixels are Rgb of Eight bits, not indices",
+                "this program's own PNGs",
+            ],
+        ),
+        (
+            "huge.png",
+            huge,
+            ["its header claims 2147483647 x 2147483647 pixels", ""],
+        ),
+    ] {
+        world.put(name, bytes);
+        world.put("good", &good);
+        for arguments in [[name, "good"], ["good", name]] {
+            let said = world.diff(&arguments);
+            assert_eq!((said.code, said.out.as_str()), (Some(2), ""), "{said:?}");
+            let begin = format!("error: {name}: ");
+            assert!(said.errors.starts_with(&begin), "{said:?}");
+            assert_eq!(said.errors.lines().count(), 1, "{said:?}");
+            for words in words {
+                assert!(said.errors.contains(words), "{words}: {said:?}");
+            }
+        }
+    }
+    // Both are told. A folder's entry with the right ending may be a folder; a device has no end.
+    let both = world.diff(&["gone", "text"]);
+    assert!(
+        both.errors
+            .starts_with("error: gone: it cannot be read: No such file")
+    );
+    assert!(both.errors.contains("\nerror: text: line 1: "), "{both:?}");
+    let endless = world.diff(&["good", "/dev/zero"]);
+    assert_eq!(endless.code, Some(2));
+    assert!(
+        endless.errors.contains("/dev/zero: it has more than"),
+        "{endless:?}"
+    );
+    fs::create_dir_all(world.path("x/1.dump")).unwrap();
+    let folder = world.diff(&["x", "x"]);
+    assert_eq!(folder.code, Some(2));
+    assert!(
+        folder.errors.contains("x/1.dump: it cannot be read"),
+        "{folder:?}"
+    );
+}
+
+#[test]
+fn the_report_shows_every_pair_that_differs() {
+    let world = World::new();
+    for (name, got) in [
+        ("1.dump", page(one_pixel)),
+        ("2.dump", page(|_| {})),
+        (
+            "<3>.dump",
+            page(|dump| dump.palette[3] = [0x2A, 0x1C, 0x0F]),
+        ),
+    ] {
+        world.put(&format!("a/{name}"), page(|_| {}));
+        world.put(&format!("b/{name}"), got);
+    }
+    let byte = file(Content::Memory, |dump| dump.pixels[4 * 0x9600] ^= 1);
+    world.put("a/4.dump", file(Content::Memory, |_| {}));
+    world.put("b/4.dump", byte);
+    world.put("a/5.png", png(|_| {}));
+    world.put("b/5.png", png(|picture| picture.pixels.fill(7)));
+    world.put("a/6.dump", page(|_| {}));
+    let said = world.diff(&["a", "b", "--report", "it differs.html"]);
+    assert_eq!(said.code, Some(2));
+    assert!(
+        said.out
+            .ends_with("4 of 6 pairs differ, 1 could not be compared\n")
+    );
+    assert!(
+        said.errors.ends_with("\nthe report: it differs.html\n"),
+        "{said:?}"
+    );
+    let html = world.read("it differs.html");
+    for words in [
+        "<h1>4 of 6 pairs differ, 1 could not be compared</h1>",
+        FIRST,
+        "6.dump is in a, b lacks it",
+        "&lt;3&gt;.dump",
+        "All of video memory",
+        "<td class=\"n\">1</td>",
+    ] {
+        assert!(html.contains(words), "{words}");
+    }
+    assert!(!html.contains("<3>") && !html.contains("2.dump"));
+    let mut expected = Vec::new();
+    for pair in ["1.dump", "3-.dump", "4.dump", "5.png"] {
+        let memory = if pair == "4.dump" { "-memory" } else { "" };
+        for of in ["expected", "got", "difference"] {
+            expected.push(format!("{pair}-{of}{memory}.png"));
+        }
+        if pair != "5.png" {
+            expected.extend(["expected", "got"].map(|of| format!("{pair}-{of}.dump")));
+        }
+    }
+    expected.sort();
+    let folder = fs::read_dir(world.path("it differs-files")).unwrap();
+    let files = folder.map(|file| file.unwrap().file_name().into_string().unwrap());
+    let mut files: Vec<_> = files.collect();
+    files.sort();
+    assert_eq!(files, expected);
+    for file in &files {
+        let address = format!("href=\"./it%20differs-files/{file}\"");
+        assert!(html.contains(&address), "{address}");
+    }
+    // The copies are the originals, and the pictures are those of the dumps.
+    for (of, folder) in [("expected", "a"), ("got", "b")] {
+        let copy = world.read(&format!("it differs-files/1.dump-{of}.dump"));
+        assert!(copy == world.read(&format!("{folder}/1.dump")));
+        let shown = fs::read(world.path(&format!("it differs-files/1.dump-{of}.png"))).unwrap();
+        let shown = Indexed::read_png(Cursor::new(shown)).unwrap();
+        assert!(shown == Dump::read(copy.as_bytes()).unwrap().picture());
+    }
+    let difference = decode(&world.path("it differs-files/1.dump-difference.png"));
+    let bright = |pixel: &[u8; 3]| pixel[0] != pixel[1] || pixel[1] != pixel[2];
+    let bright: Vec<_> = (0..)
+        .zip(&difference)
+        .filter(|(_, pixel)| bright(pixel))
+        .collect();
+    assert_eq!(bright.len(), 1);
+    assert_eq!(bright[0].0, 321);
+    let memory = decode(&world.path("it differs-files/4.dump-difference-memory.png"));
+    assert_eq!(memory.len(), 320 * 820);
+}
+
+fn decode(path: &Path) -> Vec<[u8; 3]> {
+    let bytes = fs::read(path).unwrap();
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info().unwrap();
+    let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut pixels).unwrap();
+    pixels.as_chunks::<3>().0.to_vec()
+}
+
+#[test]
+fn a_report_of_equal_files_says_so_and_has_no_folder() {
+    let world = World::new();
+    world.put("a.png", png(|_| {}));
+    let said = world.diff(&["a.png", "a.png", "--report", "r.html"]);
+    assert_eq!(said.code, Some(0), "{said:?}");
+    assert!(world.read("r.html").contains("<h1>Nothing differs</h1>"));
+    assert!(!world.path("r-files").exists());
+    // And one of files that could not be compared does not say it.
+    let said = world.diff(&["a.png", "gone", "--report", "r.html"]);
+    assert_eq!(said.code, Some(2), "{said:?}");
+    let html = world.read("r.html");
+    assert!(!html.contains("Nothing differs") && html.contains("No such file"));
+}
+
+#[test]
+fn a_report_that_cannot_be_written_is_an_error_after_the_findings() {
+    let world = World::new();
+    world.put("a", page(|_| {}));
+    world.put("b", page(one_pixel));
+    world.put("blocked-files", "a file where the folder should be");
+    fs::create_dir(world.path("folder.html")).unwrap();
+    for (report, words) in [
+        (
+            "nowhere/r.html",
+            "error: the folder nowhere/r-files cannot be made: No such",
+        ),
+        (
+            "blocked.html",
+            "error: the folder blocked-files cannot be made: File exists",
+        ),
+        (
+            "folder.html",
+            "error: folder.html cannot be written: Is a directory",
+        ),
+        ("..", "error: .. is no name for a report"),
+    ] {
+        let said = world.diff(&["a", "b", "--report", report]);
+        assert_eq!(said.code, Some(2), "{said:?}");
+        assert_eq!(said.out, format!("b differs from a: {FIRST}\n"));
+        assert!(said.errors.starts_with(words), "{said:?}");
+    }
+    assert!(!world.path("blocked.html").exists());
+    let equal = world.diff(&["a", "a", "--report", "nowhere/r.html"]);
+    assert_eq!(equal.code, Some(2), "{equal:?}");
+}

@@ -1,0 +1,426 @@
+//! Golden frames: four witnesses of each, equal byte for byte.
+//!
+//! The card in QEMU, the emulated card, the committed picture, and QEMU's screen. What is found is
+//! collected over all goldens before the verdict, and a report shows it
+//! (`target/crystal-ball/golden/report.html`).
+
+use std::path::{Path, PathBuf};
+use std::process::Command as Process;
+use std::sync::LazyLock;
+
+use crystal_ball::card::{Card, Emulated};
+use crystal_ball::diff::Subject;
+use crystal_ball::golden::{self, Findings, Golden, Transfer};
+use crystal_ball::machine::{Config, Machine};
+use crystal_ball::setup::{self, Options, Ready};
+use emulator::Access;
+use link::{Command, Content, Picture};
+use show::Memory;
+use tempfile::TempDir;
+
+static READY: LazyLock<Ready> =
+    LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
+
+fn config() -> Config {
+    Config::new(&READY)
+}
+
+fn goldens() -> Vec<Golden> {
+    golden::find(&golden::folder()).expect("the golden frames")
+}
+
+/// Where a test leaves its report if it fails.
+fn report(test: &str) -> PathBuf {
+    let image = READY.image.with_file_name("golden");
+    image.join(test).join("report.html")
+}
+
+/// Fails with all that was found.
+#[track_caller]
+fn conclude(findings: Findings, test: &str) {
+    if let Err(wrong) = findings.verdict(&report(test)) {
+        panic!("{wrong:#}");
+    }
+}
+
+#[test]
+fn emulated_card_draws_every_golden() {
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut findings = Findings::default();
+    let goldens = goldens();
+    for golden in &goldens {
+        findings.check_golden(golden, &mut emulated).unwrap();
+    }
+    assert!(goldens.len() >= 24, "{} goldens", goldens.len());
+    conclude(findings, "emulated");
+}
+
+#[test]
+fn qemu_shows_and_holds_every_golden_byte_for_byte() {
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut machine = Machine::boot(&config()).unwrap();
+    let mut findings = Findings::default();
+    for golden in goldens() {
+        findings
+            .check_cards(&golden, &mut emulated, &mut machine, Transfer::Bytes)
+            .unwrap();
+    }
+    machine.leave().unwrap();
+    conclude(findings, "qemu");
+}
+
+/// The adapters with a VGA core, another chipset, and the card's own retrace: QEMU's plain one
+/// flickers at every read.
+#[test]
+fn a_few_configurations_agree() {
+    let few = goldens();
+    let names = ["erased-turn", "nearest", "speck"];
+    let few = few
+        .iter()
+        .filter(|golden| names.contains(&golden.name.as_str()));
+    let few: Vec<_> = few.cloned().collect();
+    assert_eq!(few.len(), names.len());
+    for (vga, arguments) in [
+        ("cirrus", ""),
+        ("vmware", ""),
+        ("virtio", "-m 64"),
+        ("std", "-machine q35 -smp 2"),
+        ("std,retrace=precise", ""),
+    ] {
+        agrees(&few, vga, arguments);
+    }
+}
+
+/// Boots a configuration and checks goldens by checksum and screen.
+#[track_caller]
+fn agrees(goldens: &[Golden], vga: &str, arguments: &str) {
+    let what = format!("-vga {vga} {arguments}");
+    let mut config = config();
+    config.vga = vga.into();
+    config.arguments = arguments.split_whitespace().map(Into::into).collect();
+    let mut machine = Machine::boot(&config).unwrap_or_else(|error| panic!("{what}: {error}"));
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut findings = Findings::default();
+    for golden in goldens {
+        findings
+            .check_cards(golden, &mut emulated, &mut machine, Transfer::Checksums)
+            .unwrap_or_else(|error| panic!("{what}: {error:#}"));
+    }
+    machine.leave().expect(&what);
+    if let Err(wrong) = findings.verdict(&report("configuration")) {
+        panic!("{what}: {wrong:#}");
+    }
+}
+
+/// What is asked of a boot to be the same as of every other: all of video memory after three
+/// pictures, and what drawing them took.
+fn evidence(arguments: &str) -> Vec<String> {
+    let mut config = config();
+    config.arguments = arguments.split_whitespace().map(Into::into).collect();
+    let mut machine = Machine::boot(&config).unwrap();
+    machine
+        .show(&[0, 480, u32::MAX].map(Picture::Frame))
+        .unwrap();
+    let mut evidence = machine.ask(Command::Checksums(Content::Memory)).unwrap();
+    evidence.extend(machine.ask(Command::Counts).unwrap());
+    machine.leave().unwrap();
+    evidence
+}
+
+/// What the emulated card says to the same.
+fn emulated_evidence() -> Vec<String> {
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    emulated
+        .show(&[0, 480, u32::MAX].map(Picture::Frame))
+        .unwrap();
+    let mut evidence = emulated.ask(Command::Checksums(Content::Memory)).unwrap();
+    evidence.extend(emulated.ask(Command::Counts).unwrap());
+    evidence
+}
+
+#[test]
+fn counted_instructions_change_no_byte() {
+    assert_eq!(evidence("-icount shift=0"), emulated_evidence());
+}
+
+/// The wide set, by `cargo wide`: each configuration with every golden, a hundred boots, eight at
+/// once.
+#[test]
+#[ignore = "takes about ten minutes; run it by `cargo wide`"]
+fn wide_set() {
+    LazyLock::force(&READY);
+    let goldens = goldens();
+    let expected = emulated_evidence();
+    let configurations = [
+        ("std", ""),
+        ("cirrus", ""),
+        ("vmware", ""),
+        ("virtio", ""),
+        ("std,retrace=precise", ""),
+        ("std", "-machine q35"),
+        ("cirrus", "-machine q35"),
+        ("virtio", "-machine q35"),
+        ("std", "-m 32"),
+        ("std", "-m 64"),
+        ("std", "-m 1024"),
+        ("std", "-m 3072"),
+        ("std", "-cpu qemu64"),
+        ("std", "-cpu max"),
+        ("std", "-cpu Nehalem"),
+        ("std", "-smp 4"),
+        ("std", "-icount shift=0"),
+    ];
+    for (vga, arguments) in configurations {
+        eprintln!("-vga {vga} {arguments}");
+        agrees(&goldens, vga, arguments);
+    }
+    for boot in 1..=100 {
+        assert_eq!(evidence(""), expected, "boot {boot}");
+        if boot % 10 == 0 {
+            eprintln!("{boot} boots");
+        }
+    }
+    let together: Vec<_> = (0..8)
+        .map(|_| std::thread::spawn(|| evidence("")))
+        .collect();
+    for boot in together {
+        assert_eq!(boot.join().unwrap(), expected);
+    }
+    eprintln!(
+        "{} configurations with {} goldens each, 100 boots one by one, 8 at once: all equal",
+        configurations.len(),
+        goldens.len()
+    );
+}
+
+/// A folder with copies of two goldens.
+fn two_goldens() -> TempDir {
+    let copy = tempfile::tempdir().unwrap();
+    for name in ["belt.toml", "belt.png", "north.toml", "north.png"] {
+        std::fs::copy(golden::folder().join(name), copy.path().join(name)).unwrap();
+    }
+    copy
+}
+
+/// What checking a folder finds.
+fn found(folder: &Path) -> Vec<String> {
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut findings = Findings::default();
+    for golden in golden::find(folder).unwrap() {
+        findings.check_golden(&golden, &mut emulated).unwrap();
+    }
+    findings.found().iter().map(ToString::to_string).collect()
+}
+
+#[test]
+fn missing_and_wrong_goldens_are_found_by_folder() {
+    let copy = two_goldens();
+    let at = |name: &str| copy.path().join(name);
+    assert_eq!(found(copy.path()), [""; 0]);
+    // The wrong golden.
+    std::fs::copy(at("north.png"), at("belt.png")).unwrap();
+    let wrong = found(copy.path());
+    assert_eq!(wrong.len(), 1);
+    assert!(wrong[0].starts_with("belt: "), "{wrong:?}");
+    // One that is none.
+    std::fs::write(at("belt.png"), b"\x89PNG").unwrap();
+    let wrong = found(copy.path());
+    assert!(wrong[0].contains("belt.png is no golden"), "{wrong:?}");
+    std::fs::remove_file(at("belt.png")).unwrap();
+    let wrong = found(copy.path());
+    assert!(wrong[0].contains("never blessed"), "{wrong:?}");
+    // An orphan, a description that is none, a stranger, nothing at all.
+    let refused = |words: &str| {
+        let error = format!("{:#}", golden::find(copy.path()).unwrap_err());
+        assert!(error.contains(words), "{error}");
+    };
+    std::fs::remove_file(at("north.toml")).unwrap();
+    refused("north.png is an orphan");
+    std::fs::remove_file(at("north.png")).unwrap();
+    for (description, words) in [
+        ("about = \"a\"", "missing field `show`"),
+        ("about = \"a\"\nshow = []", "it shows nothing"),
+        ("about = \"a\"\nshow = [\"x\"]", "'x' is no picture"),
+        (
+            "about = \"a\"\nshow = [\"0\"]\nmore = 1",
+            "unknown field `more`",
+        ),
+        ("belt", "belt.toml is no golden's description"),
+    ] {
+        std::fs::write(at("belt.toml"), description).unwrap();
+        refused(words);
+    }
+    std::fs::write(at("belt.txt"), "").unwrap();
+    std::fs::remove_file(at("belt.toml")).unwrap();
+    refused("neither a description nor a PNG");
+    std::fs::remove_file(at("belt.txt")).unwrap();
+    refused("has no golden frames");
+}
+
+/// A picture that is not the one that was asked for, as like it as it may be.
+#[test]
+fn the_wrong_frame_is_found() {
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut dump = |frame| {
+        emulated.show(&[Picture::Frame(frame)]).unwrap();
+        Subject::Dump(emulated.dump(Content::Page).unwrap())
+    };
+    let mut findings = Findings::default();
+    let golden = &goldens()[0];
+    findings.compare(golden, "frames", &dump(480), &dump(480));
+    assert!(findings.found().is_empty());
+    findings.compare(golden, "frames", &dump(480), &dump(481));
+    let found = findings.found()[0].to_string();
+    assert!(found.contains("picture: expected 480, got 481"), "{found}");
+}
+
+/// By the program itself: what changes is told and shown, QEMU is asked, the PNGs are written.
+#[test]
+fn a_blessing_tells_what_changes_and_makes_the_goldens() {
+    LazyLock::force(&READY);
+    let copy = two_goldens();
+    let at = |name: &str| copy.path().join(name);
+    let good = std::fs::read(at("belt.png")).unwrap();
+    std::fs::copy(at("north.png"), at("belt.png")).unwrap();
+    std::fs::write(at("new.toml"), "about = \"A new one.\"\nshow = [\"7\"]\n").unwrap();
+    let bless = || {
+        let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
+        let output = program.arg("bless").arg(copy.path()).output().unwrap();
+        let words = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{words}");
+        words
+    };
+    let words = bless();
+    for line in [
+        "belt: changes: ",
+        "new: is new: A new one.",
+        "2 golden frames blessed",
+    ] {
+        assert!(words.contains(line), "{words}");
+    }
+    assert_eq!(std::fs::read(at("belt.png")).unwrap(), good);
+    assert_eq!(found(copy.path()), [""; 0]);
+    assert!(bless().contains("nothing to bless"));
+}
+
+/// A stray write anywhere is seen: on a hidden page, behind the last one, in another plane.
+#[test]
+fn all_of_video_memory_is_as_the_emulated_card_has_it() {
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut machine = Machine::boot(&config()).unwrap();
+    let pictures = [0, 100, 200, 4_000_000_000, 300].map(Picture::Frame);
+    emulated.show(&pictures).unwrap();
+    machine.show(&pictures).unwrap();
+    let (expected, got) = (
+        emulated.dump(Content::Memory).unwrap(),
+        machine.dump(Content::Memory).unwrap(),
+    );
+    assert_eq!(got.pixels.len(), 4 * 0x1_0000);
+    let golden = &goldens()[0];
+    let mut findings = Findings::default();
+    findings.compare(
+        golden,
+        "all of video memory",
+        &Subject::Dump(expected),
+        &Subject::Dump(got),
+    );
+    machine.leave().unwrap();
+    conclude(findings, "memory");
+}
+
+/// A write as it reaches the card, a byte at a time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Write {
+    Port(u16, u8),
+    Memory(u16, u8),
+}
+
+impl Write {
+    /// From a line of QEMU's trace; none if it is of another device.
+    fn traced(line: &str) -> Option<Self> {
+        let hex = |name: &str| {
+            let mut words = line.split([' ', ',']).skip_while(|word| *word != name);
+            let digits = words.nth(1)?.strip_prefix("0x")?;
+            u32::from_str_radix(digits, 16).ok()
+        };
+        if line.contains("vga_std_write_io ") {
+            return Some(Self::Port(
+                hex("addr")?.try_into().ok()?,
+                hex("val")?.try_into().ok()?,
+            ));
+        }
+        let ours = line.contains("memory_region_ops_write ") && line.contains("'vga-lowmem'");
+        let (at, value) = (hex("addr")?, hex("value")?);
+        ours.then(|| Self::Memory((at - 0xA_0000) as u16, value as u8))
+    }
+
+    /// From the emulated card's log: a word to a port goes to it and the next one.
+    fn logged(access: &Access) -> Vec<Self> {
+        match *access {
+            Access::Out8(port, value) => vec![Self::Port(port, value)],
+            Access::Out16(port, value) => {
+                let [low, high] = value.to_le_bytes();
+                vec![Self::Port(port, low), Self::Port(port + 1, high)]
+            }
+            Access::Store(at, value) => vec![Self::Memory(at, value)],
+            _ => Vec::new(),
+        }
+    }
+}
+
+/// QEMU's own record of every write, against the emulated card's: a witness that neither the
+/// kernel nor this project made. So one Map Mask write for each column is a fact, and not the
+/// kernel's word.
+#[test]
+fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let trace = folder.path().join("trace");
+    let mut config = config();
+    config.arguments = vec!["-D".into(), trace.clone().into()];
+    let mut machine = Machine::boot(&config).unwrap();
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    // The fourth picture erases what the first left on its page.
+    let before = [0, 60, 120].map(Picture::Frame);
+    emulated.show(&before).unwrap();
+    machine.show(&before).unwrap();
+    let events = ["vga_std_write_io", "memory_region_ops_write"];
+    for event in events {
+        machine.trace(event, true).unwrap();
+    }
+    let show = Command::Show(Picture::Frame(180));
+    machine.ask(show).unwrap();
+    for event in events {
+        machine.trace(event, false).unwrap();
+    }
+    machine.leave().unwrap();
+    emulated.vga().start_log();
+    emulated.ask(show).unwrap();
+    let log = emulated.vga().take_log();
+    let logged: Vec<_> = log.iter().flat_map(Write::logged).collect();
+    let text = std::fs::read_to_string(&trace).unwrap();
+    let traced: Vec<_> = text.lines().filter_map(Write::traced).collect();
+    for (i, (traced, logged)) in traced.iter().zip(&logged).enumerate() {
+        assert_eq!(
+            traced, logged,
+            "write {i} of QEMU's trace and of the emulated card's log"
+        );
+    }
+    assert_eq!(traced.len(), logged.len(), "one of the two goes on");
+    // 3C4h index 2 is Map Mask: once to erase, and once for each column that was drawn.
+    let map_masks = traced
+        .windows(2)
+        .filter(|pair| matches!(pair, [Write::Port(0x3C4, 2), Write::Port(0x3C5, _)]));
+    let counts = emulated.ask(Command::Counts).unwrap();
+    let mut columns = counts[0].split(' ').skip_while(|word| *word != "columns");
+    let columns: usize = columns.nth(1).unwrap().parse().unwrap();
+    assert!(columns > 3000, "{columns} columns");
+    assert_eq!(map_masks.count(), columns + 1);
+}

@@ -1,0 +1,376 @@
+//! The serial line when it is bad: someone in the middle alters what the kernel says, or floods it.
+//!
+//! QEMU is real and so is the image. QEMU is started by a small script that gives it another
+//! socket for COM1; what comes there is passed on to the program, altered.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::Shutdown;
+use std::os::unix::fs::PermissionsExt;
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::sync::LazyLock;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread;
+use std::time::Duration;
+
+use crystal_ball::card::{Card, Emulated};
+use crystal_ball::dump::Dump;
+use crystal_ball::machine::{Config, Failure, Machine, Verdict};
+use crystal_ball::setup::{self, Options, Ready};
+use link::{Command, Content, Picture};
+use show::Memory;
+use tempfile::TempDir;
+
+static READY: LazyLock<Ready> =
+    LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
+
+/// What becomes of a line of the kernel's, its end included.
+type Alter = Box<dyn FnMut(&[u8]) -> Vec<u8> + Send>;
+
+/// A machine whose serial line goes through `alter`, and the folder that it needs.
+fn tapped(arguments: Vec<String>, alter: Alter) -> (Machine, TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let [kernel, host, script] = ["kernel", "host", "qemu"].map(|name| folder.path().join(name));
+    let listener = UnixListener::bind(&kernel).unwrap();
+    let qemu = &READY.qemu.path;
+    let text = format!(
+        "#!/bin/sh
+for argument do
+    shift
+    case $argument in socket,id=com1,path=*)
+        printf %s \"${{argument#*path=}}\" > '{}'
+        argument='socket,id=com1,path={}' ;;
+    esac
+    set -- \"$@\" \"$argument\"
+done
+exec '{}' \"$@\"
+",
+        host.display(),
+        kernel.display(),
+        qemu.display()
+    );
+    std::fs::write(&script, text).unwrap();
+    std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)).unwrap();
+    thread::spawn(move || pass_on(&listener, &host, alter));
+    let config = Config {
+        qemu: script,
+        arguments: arguments.into_iter().map(Into::into).collect(),
+        ..Config::new(&READY)
+    };
+    let mut machine = Machine::boot(&config).expect("boots");
+    machine.show(&[Picture::Frame(480)]).expect("shows");
+    (machine, folder)
+}
+
+/// The someone in the middle.
+fn pass_on(listener: &UnixListener, host: &Path, mut alter: Alter) {
+    let (kernel, _) = listener.accept().unwrap();
+    let host = UnixStream::connect(std::fs::read_to_string(host).unwrap()).unwrap();
+    let (mut from_host, mut to_kernel) = (host.try_clone().unwrap(), kernel.try_clone().unwrap());
+    thread::spawn(move || std::io::copy(&mut from_host, &mut to_kernel));
+    let (mut kernel, mut host) = (BufReader::new(kernel), host);
+    let mut line = Vec::new();
+    while matches!(kernel.read_until(b'\n', &mut line), Ok(1..)) {
+        if host.write_all(&alter(&line)).is_err() {
+            break;
+        }
+        line.clear();
+    }
+    // The other thread holds both sockets open, too.
+    for socket in [host, kernel.into_inner()] {
+        let _ = socket.shutdown(Shutdown::Both);
+    }
+}
+
+/// A failure whose evidence goes when the test has ended well.
+struct Judged(Failure);
+
+impl Drop for Judged {
+    fn drop(&mut self) {
+        if let (Some(folder), false) = (&self.0.evidence, thread::panicking()) {
+            std::fs::remove_dir_all(folder).unwrap();
+        }
+    }
+}
+
+/// How a dump ends of which a line is altered. `alter` sees the lines from `line 100` on with
+/// their number.
+fn dump_altered(
+    mut alter: impl FnMut(usize, &[u8]) -> Vec<u8> + Send + 'static,
+) -> anyhow::Result<Dump> {
+    let mut number = None;
+    let alter: Alter = Box::new(move |line| {
+        number = match number {
+            None if line.starts_with(b"line 100 ") => Some(100),
+            Some(before) => Some(before + 1),
+            None => None,
+        };
+        match number {
+            Some(number) => alter(number, line),
+            None => line.to_vec(),
+        }
+    });
+    let (mut machine, _folder) = tapped(Vec::new(), alter);
+    let dump = machine.dump(Content::Page)?;
+    machine.leave()?;
+    Ok(dump)
+}
+
+#[track_caller]
+fn judged(outcome: anyhow::Result<Dump>) -> Judged {
+    let error = outcome.expect_err("the dump was accepted");
+    Judged(error.downcast().expect("a failure with a verdict"))
+}
+
+#[test]
+fn whatever_happens_to_a_dump_is_noticed_and_named() {
+    type Step = fn(usize, &[u8]) -> Vec<u8>;
+    let faults: [(&str, Step, &str); 8] = [
+        (
+            "a flipped bit",
+            |n, line| {
+                let mut line = line.to_vec();
+                line[40] ^= u8::from(n == 100);
+                line
+            },
+            "the line says checksum",
+        ),
+        (
+            "a dropped byte",
+            |n, line| {
+                let mut line = line.to_vec();
+                if n == 100 {
+                    line.remove(40);
+                }
+                line
+            },
+            "the line says checksum",
+        ),
+        (
+            "a CR in a line",
+            |n, line| {
+                let mut line = line.to_vec();
+                if n == 100 {
+                    line.insert(40, b'\r');
+                }
+                line
+            },
+            "a line with the byte 0d",
+        ),
+        (
+            "a lost line end",
+            |n, line| line[..line.len() - usize::from(n == 100)].to_vec(),
+            "a line of more than 700 bytes",
+        ),
+        (
+            "a lost line",
+            |n, line| if n == 100 { Vec::new() } else { line.to_vec() },
+            "stands where 'line 100' should",
+        ),
+        (
+            "a repeated line",
+            |n, line| line.repeat(1 + usize::from(n == 100)),
+            "stands where 'line 101' should",
+        ),
+        (
+            "a dump cut short",
+            |n, line| {
+                if (150..241).contains(&n) {
+                    Vec::new()
+                } else {
+                    line.to_vec()
+                }
+            },
+            "cut short: 'line 150' should come here",
+        ),
+        (
+            "a dump without its end",
+            |n, line| if n == 240 { Vec::new() } else { line.to_vec() },
+            "cut short: 'end' should come here",
+        ),
+    ];
+    for (fault, step, words) in faults {
+        let judged = judged(dump_altered(step));
+        let Verdict::Garbled { why } = &judged.0.verdict else {
+            panic!("{fault}: {}", judged.0);
+        };
+        assert!(why.contains(words), "{fault}: {why}");
+    }
+}
+
+#[test]
+fn swapped_lines_are_told_by_their_numbers() {
+    let mut kept = Vec::new();
+    let judged = judged(dump_altered(move |n, line| match n {
+        100 => {
+            kept = line.to_vec();
+            Vec::new()
+        }
+        101 => [line, &kept].concat(),
+        _ => line.to_vec(),
+    }));
+    let words = judged.0.to_string();
+    assert!(words.contains("stands where 'line 100' should"), "{words}");
+}
+
+/// What a terminal does to every line changes nothing.
+#[test]
+fn line_ends_of_a_terminal_are_accepted() {
+    let plain = dump_altered(|_, line| line.to_vec()).unwrap();
+    let returned = |_, line: &[u8]| [&line[..line.len() - 1], b"\r\n"].concat();
+    assert_eq!(dump_altered(returned).unwrap(), plain);
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    emulated.show(&[Picture::Frame(480)]).unwrap();
+    assert_eq!(emulated.dump(Content::Page).unwrap(), plain);
+}
+
+#[test]
+fn a_hang_in_the_middle_of_a_dump_is_a_hang() {
+    let judged = judged(dump_altered(|_, _| Vec::new()));
+    let waited_for = "the answer to 'dump'".into();
+    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+}
+
+/// A non-maskable interrupt, which the kernel knows no reason for, strikes between two lines.
+#[test]
+fn a_crash_in_the_middle_of_a_dump_is_told_with_its_registers() {
+    let folder = tempfile::tempdir().unwrap();
+    let socket = folder.path().join("monitor");
+    let monitor = format!("unix:{},server=on,wait=off", socket.display());
+    let mut lines = 0;
+    let alter = move |line: &[u8]| {
+        lines += usize::from(line.starts_with(b"line "));
+        if lines == 100 {
+            lines += 1;
+            strike(&socket);
+        }
+        line.to_vec()
+    };
+    let arguments = vec!["-monitor".into(), monitor];
+    let (mut machine, _folder) = tapped(arguments, Box::new(alter));
+    let judged = judged(machine.dump(Content::Page));
+    let Verdict::Exception { report } = &judged.0.verdict else {
+        panic!("{}", judged.0);
+    };
+    assert_eq!(report[0], "exception non-maskable interrupt (vector 2)");
+}
+
+/// Sends the interrupt by QEMU's monitor, and waits until it was taken. Meanwhile nobody reads
+/// what the kernel says, so it can't have come to the dump's end.
+fn strike(monitor: &Path) {
+    let mut monitor = UnixStream::connect(monitor).unwrap();
+    monitor.write_all(b"nmi\n").unwrap();
+    let mut said = Vec::new();
+    let mut bytes = [0; 256];
+    // The prompt after the command's echo.
+    while said.windows(6).filter(|text| text == b"(qemu)").count() < 2 {
+        let count = monitor.read(&mut bytes).unwrap();
+        assert!(count > 0, "the monitor is gone");
+        said.extend_from_slice(&bytes[..count]);
+    }
+}
+
+/// Nobody reads for a while: the kernel waits, and then everything is there and in order.
+#[test]
+fn a_host_that_stops_reading_is_waited_for() {
+    let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
+    let mut waits = true;
+    let alter = move |line: &[u8]| {
+        if line.starts_with(b"crystal-ball dump ") && std::mem::take(&mut waits) {
+            wait.recv().unwrap();
+        }
+        line.to_vec()
+    };
+    let (mut machine, _folder) = tapped(Vec::new(), Box::new(alter));
+    let mut asked = Vec::new();
+    for frame in 0..10 {
+        asked.push(format!("show {frame}"));
+        asked.push("dump".to_string());
+    }
+    for line in &asked {
+        machine.send_line(line).unwrap();
+    }
+    // Longer than the line's buffers last.
+    machine.rest(Duration::from_secs(2)).unwrap();
+    go.send(()).unwrap();
+    for line in &asked {
+        let mut answer = machine.answer(line).unwrap();
+        assert_eq!(answer.pop().unwrap(), format!("ok {line}"));
+        if line == "dump" {
+            Dump::from_lines(&answer).unwrap();
+        }
+    }
+    machine.leave().unwrap();
+}
+
+#[test]
+fn noise_on_the_line_is_answered_and_survived() {
+    let mut machine = Machine::boot(&Config::new(&READY)).unwrap();
+    machine.ask(Command::Hold).unwrap();
+    for (noise, reason) in [
+        (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
+        (vec![b'x'; 2_000_000], "more than 700 bytes"),
+        (b"show 4294967296\n".to_vec(), "a frame number"),
+        (
+            b"show pose 0 0 0 ffffffff\n".to_vec(),
+            "a distance is 0 to 00800000",
+        ),
+        (b"shew 1\n".to_vec(), "no command 'shew'"),
+        (b"show 1 *00000000\n".to_vec(), "says checksum 00000000"),
+    ] {
+        machine.send_raw(&noise).unwrap();
+        if !noise.ends_with(b"\n") {
+            machine.send_raw(b"\n").unwrap();
+        }
+        let answer = machine.answer("noise").unwrap();
+        assert!(
+            answer[0].starts_with("error ") && answer[0].contains(reason),
+            "{answer:?}"
+        );
+    }
+    // A command in two parts, and one as a terminal sends it.
+    machine.send_raw(b"sho").unwrap();
+    machine.rest(Duration::from_millis(50)).unwrap();
+    machine.send_raw(b"w 3\r\n").unwrap();
+    let answer = machine.answer("show 3").unwrap();
+    assert_eq!(answer.last().unwrap(), "ok show 3");
+    machine.leave().unwrap();
+}
+
+/// A flood of lines that are none, each of them answered, and the picture is as it was.
+#[test]
+fn a_flood_of_noise_changes_no_byte() {
+    let mut machine = Machine::boot(&Config::new(&READY)).unwrap();
+    machine.show(&[Picture::Frame(7)]).unwrap();
+    let before = machine.ask(Command::Checksums(Content::Memory)).unwrap();
+    let seed = std::process::id();
+    println!("seed {seed}");
+    let mut state = u64::from(seed) << 1 | 1;
+    let mut random = move || {
+        // Knuth's MMIX generator; its high bits are the good ones.
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 56) as u8
+    };
+    let flood: Vec<u8> = (0..500_000).map(|_| random()).collect();
+    machine.send_raw(&flood).unwrap();
+    machine.send_raw(b"\nversion\n").unwrap();
+    let ends = flood.iter().filter(|&&byte| byte == b'\n').count();
+    let mut errors = 0;
+    loop {
+        let answer = machine.answer("noise").unwrap();
+        match answer.last().unwrap().as_str() {
+            "ok version" => break,
+            line => assert!(line.starts_with("error "), "{line}"),
+        }
+        errors += 1;
+    }
+    assert_eq!(errors, ends + 1);
+    assert_eq!(
+        machine.ask(Command::Checksums(Content::Memory)).unwrap(),
+        before
+    );
+    machine.leave().unwrap();
+}
