@@ -2,10 +2,12 @@
 
 use std::time::{Duration, Instant};
 
-use crystal_ball::card::Card;
+use crystal_ball::card::{Card, Emulated};
+use crystal_ball::golden::{self, Findings, Golden, Transfer};
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::setup::{self, Options};
-use link::{Command, Picture};
+use link::{Command, Content, Picture};
+use show::Memory;
 
 /// How long the running show is watched.
 const WATCHED: Duration = Duration::from_secs(60);
@@ -18,7 +20,11 @@ fn figures() {
     let options = Options::default();
     let ready = setup::ready(&options).expect("the set-up");
     let config = Config::new(&ready);
+    let goldens = golden::find(&golden::folder()).expect("golden frames");
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).expect("an emulated card");
     let (mut set_ups, mut kernels, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
+    let mut verified = Vec::new();
     for _ in 0..BOOTS {
         let start = Instant::now();
         setup::ready(&options).expect("the set-up, warm");
@@ -29,10 +35,50 @@ fn figures() {
         machine.wait_until_running().expect("runs");
         pictures.push(start.elapsed());
         machine.leave().expect("leaves");
+        let start = Instant::now();
+        let mut machine = Machine::boot(&config).expect("boots");
+        verify(&goldens[..1], &mut emulated, &mut machine, Transfer::Bytes);
+        verified.push(start.elapsed());
+        machine.leave().expect("leaves");
     }
     println!("set-up, warm:                  {}", spread(set_ups));
     println!("QEMU's start to the kernel:    {}", spread(kernels));
     println!("QEMU's start to first picture: {}", spread(pictures));
+    println!(
+        "QEMU's start to first verified golden: {}",
+        spread(verified)
+    );
+
+    let mut machine = Machine::boot(&config).expect("boots");
+    for (transfer, how) in [
+        (Transfer::Checksums, "by checksum"),
+        (Transfer::Bytes, "by every byte"),
+    ] {
+        let mut times: Vec<_> = (0..BOOTS)
+            .map(|_| verify(&goldens, &mut emulated, &mut machine, transfer))
+            .collect();
+        times.sort();
+        let rate = |time: Duration| goldens.len() as f64 / time.as_secs_f64();
+        println!(
+            "goldens verified a second, {how}: {:.1} (of {BOOTS}: {:.1} to {:.1})",
+            rate(times[BOOTS / 2]),
+            rate(times[BOOTS - 1]),
+            rate(times[0])
+        );
+    }
+    for command in [
+        Command::Checksums(Content::Page),
+        Command::Dump(Content::Page),
+        Command::Dump(Content::Memory),
+    ] {
+        let lines = machine.ask(command).expect("answers");
+        // Checksum and LF, and the closing line.
+        let line = |line: &String| line.len() + 11;
+        let bytes: usize = lines.iter().map(line).sum();
+        let closing = line(&format!("ok {command}"));
+        println!("serial bytes of '{command}': {}", bytes + closing);
+    }
+    machine.leave().expect("leaves");
 
     let mut machine = Machine::boot(&config).expect("boots");
     machine.wait_until_running().expect("runs");
@@ -66,6 +112,25 @@ fn figures() {
         }
     }
     machine.leave().expect("leaves");
+}
+
+/// Verifies goldens, and tells how long it took.
+fn verify(
+    goldens: &[Golden],
+    emulated: &mut Emulated<'_>,
+    machine: &mut Machine,
+    transfer: Transfer,
+) -> Duration {
+    let start = Instant::now();
+    let mut findings = Findings::default();
+    for golden in goldens {
+        findings.check_golden(golden, emulated).expect("checks");
+        findings
+            .check_cards(golden, emulated, machine, transfer)
+            .expect("checks");
+    }
+    assert!(findings.found().is_empty(), "{:?}", findings.found());
+    start.elapsed()
 }
 
 /// Median, least and most.
