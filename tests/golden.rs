@@ -335,6 +335,58 @@ fn all_of_video_memory_is_as_the_emulated_card_has_it() {
     conclude(findings, "memory");
 }
 
+/// By the program itself: the files of `dump` and of `emulate` are the same bytes, and `diff` says
+/// so.
+#[test]
+fn emulate_writes_what_dump_writes() {
+    LazyLock::force(&READY);
+    let folder = tempfile::tempdir().unwrap();
+    let crystal_ball = |arguments: &[&str]| {
+        let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
+        let output = program.args(arguments).current_dir(&folder).output();
+        let output = output.unwrap();
+        let words = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{arguments:?}: {words}");
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let pose = "--pose 0 c0000000 20000000 1b333";
+    for which in [
+        format!("--frames 5..7 --frame 4294967295 {pose}"),
+        "--frame 9 --all".into(),
+    ] {
+        for (command, out) in [("dump", "a"), ("emulate", "b")] {
+            let mut arguments = vec![command, "--out", out];
+            arguments.extend(which.split(' '));
+            let told = crystal_ball(&arguments);
+            assert!(
+                told.lines().all(|path| folder.path().join(path).exists()),
+                "{told}"
+            );
+        }
+    }
+    // Five pictures, a text and a PNG of each.
+    assert_eq!(
+        crystal_ball(&["diff", "a", "b"]),
+        "equal: 10 pairs, 953344 pixels\n"
+    );
+    for file in std::fs::read_dir(folder.path().join("a")).unwrap() {
+        let file = file.unwrap();
+        let [a, b] = ["a", "b"].map(|side| folder.path().join(side).join(file.file_name()));
+        assert!(
+            std::fs::read(&a).unwrap() == std::fs::read(b).unwrap(),
+            "{}",
+            a.display()
+        );
+    }
+    // A frame's dump does not depend on the frames before it.
+    crystal_ball(&["emulate", "--out", "c", "--frame", "6"]);
+    let [alone, after] = ["c", "a"].map(|side| {
+        let dump = folder.path().join(side).join("frame-000006.dump");
+        std::fs::read(dump).unwrap()
+    });
+    assert!(alone == after);
+}
+
 /// A write as it reaches the card, a byte at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Write {

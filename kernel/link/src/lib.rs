@@ -14,7 +14,24 @@
 //!
 //! The host sends a [`Command`] a line; it may end it in a checksum too, and then the kernel
 //! checks it. The kernel answers with any number of lines and closes with one that begins with
-//! `ok` or `error`. Between answers it says on its own:
+//! `ok` (and repeats the command) or `error` (and says why):
+//!
+//! | command | answer, before `ok` |
+//! | --- | --- |
+//! | `hold` | |
+//! | `run` | |
+//! | `show 480`, `show pose 0 13e93e93 0ccccccc 2f333` | `page 1` |
+//! | `dump`, `dump all` | a [`dump`] |
+//! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
+//! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
+//! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
+//! | `state` | `held` or `running tick 99`, `scene ball`, `picture 480`, `page 1 start 4b00` |
+//! | `version` | `crystal-ball 0.1.0 protocol 2 dump 1` |
+//! | `fail KIND` | none: the kernel breaks in the way that is named ([`Fault`]) |
+//! | `leave` | after the `ok` QEMU ends |
+//!
+//! Commands that come while an answer is under way are answered after it, in their order. A host
+//! that does not read is waited for. Between answers the kernel says on its own:
 //!
 //! - `hello crystal-ball VERSION protocol 1`: the boot loader has handed over;
 //! - `running`: the first picture is on the screen;
