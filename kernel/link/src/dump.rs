@@ -236,7 +236,7 @@ impl fmt::Display for Hex<'_> {
 /// ```
 ///
 /// # Panics
-/// As [`write`].
+/// As [`write()`].
 pub fn write_checksums<S>(
     header: &Header<S>,
     palette: &[[u8; 3]; 256],

@@ -41,16 +41,6 @@ impl Column<'_> {
         }
     }
 
-    /// Pixels in the column.
-    pub fn len(&self) -> u16 {
-        self.len
-    }
-
-    /// Whether the column has no pixel.
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-
     /// Writes every pixel from the top down; `texel` is called once for each.
     #[inline(always)]
     pub fn fill(self, mut texel: impl FnMut() -> u8) {

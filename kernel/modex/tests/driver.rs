@@ -6,7 +6,7 @@ use std::ptr::NonNull;
 use modex::registers::*;
 use modex::{
     Bus, Column, Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PAGES, PLANE_BYTES, PlanarBuffer,
-    STRIDE, WIDTH,
+    STRIDE, Tally, WIDTH,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -204,6 +204,8 @@ fn a_register_that_does_not_hold_is_named() {
         let error = ModeX::set(&mut recorder, &BLACK).unwrap_err();
         assert_eq!((error.block, error.index), (block, stuck.1));
         assert_eq!(error.actual, 0);
+        let told = format!("{block} register {:02X} reads 00 after", error.index);
+        assert!(error.to_string().starts_with(&told), "{error}");
     }
 }
 
@@ -247,6 +249,7 @@ fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
         assert_eq!(counts.flip.ports, 1);
         let shown = card.shown_page();
         assert_eq!(shown, (picture + 1) % PAGES);
+        assert_eq!(usize::from(card.start_address()), shown * PAGE_BYTES);
         let recorder = card.bus().inner();
         assert_eq!(
             recorder.registers[&(CRTC, START_ADDRESS_HIGH)],
@@ -318,8 +321,9 @@ fn a_column_beyond_the_page_is_refused() {
 
 #[test]
 fn pixels_come_back_from_their_planes_and_nothing_is_stored() {
-    let mut card = ModeX::set(Recorder::new(), &[[0; 3]; 256]).unwrap();
-    let recorder = card.bus();
+    let mut counted = Counted::new(Recorder::new());
+    let mut card = ModeX::set(&mut counted, &[[0; 3]; 256]).unwrap();
+    let recorder = card.bus().inner();
     for (plane, bytes) in recorder.planes.iter_mut().enumerate() {
         for (at, byte) in bytes.iter_mut().enumerate() {
             *byte = (4 * at + plane) as u8;
@@ -331,8 +335,44 @@ fn pixels_come_back_from_their_planes_and_nothing_is_stored() {
     card.load(0xFFFE, &mut pixels);
     let expected: Vec<u8> = (0..24).map(|i| (4 * 0xFFFE + i) as u8).collect();
     assert_eq!(pixels[..], expected);
-    let recorder = card.bus();
+    let recorder = card.bus().inner();
     assert_eq!(recorder.registers[&(GRAPHICS, READ_MAP)], 0);
     let loads = recorder.log.iter().filter(|a| matches!(a, Access::Load(_)));
     assert_eq!((loads.count(), recorder.log.len()), (24, 24 + 5));
+}
+
+#[test]
+fn every_write_is_counted_once_for_its_purpose() {
+    let mut counted = Counted::new(Recorder::new());
+    let mut card = ModeX::set(&mut counted, &BLACK).unwrap();
+    let mut canvas = card.begin(&[0; HEIGHT]);
+    canvas.column(7, 30, 100, |column| column.fill(|| 1));
+    card.flip();
+    let named = counted.counts().named();
+    assert_eq!(
+        named.map(|(name, _)| name),
+        ["setup", "draw", "erase", "flip"]
+    );
+    let [setup, draw, erase, flip] = named.map(|(_, tally)| tally);
+    let tallies = |ports, map_mask, stores, bytes| Tally {
+        ports,
+        map_mask,
+        stores,
+        bytes,
+    };
+    assert_eq!(draw, tallies(1, 1, 100, 100));
+    // The first time the whole page, and 8 bytes a store.
+    let page = PAGE_BYTES as u64;
+    assert_eq!(erase, tallies(1, 1, page / 8, page));
+    assert_eq!(flip, tallies(1, 0, 0, 0));
+    // The rest is the mode set's: Map Mask once, and all of the planes.
+    let planes = PLANE_BYTES as u64;
+    let log = &counted.inner().log;
+    let ports = log
+        .iter()
+        .filter(|a| matches!(a, Access::Out8(..) | Access::Out16(..)));
+    assert_eq!(
+        setup,
+        tallies(ports.count() as u64 - 3, 1, planes / 8, planes)
+    );
 }

@@ -123,9 +123,9 @@ impl Crtc {
         let total = (register(0x06) | ninth_and_tenth(0, 5)) + 2;
         let lines = (register(0x12) | ninth_and_tenth(1, 6)) + 1;
         let retrace = register(0x10) | ninth_and_tenth(2, 7);
-        // CR11 holds the last four bits of the line after the retrace.
-        let retrace_end =
-            (retrace + 1..=retrace + 16).find(|line| line & 15 == register(0x11) & 15);
+        // CR11 holds the last four bits of the line after the retrace, 1 to 16 lines on.
+        let next = retrace + 1;
+        let retrace_end = next + (register(0x11).wrapping_sub(next) & 15);
         // CR14 bit 6: dwords, CR17 bit 6: bytes; CR13 counts two of either.
         let unit = match (register(0x14) & 0x40 != 0, register(0x17) & 0x40 != 0) {
             (true, _) => 4,
@@ -139,7 +139,7 @@ impl Crtc {
             stride: register(0x13) * 2 * unit,
             total,
             retrace,
-            retrace_end: retrace_end.unwrap_or(retrace + 16),
+            retrace_end,
         })
     }
 }

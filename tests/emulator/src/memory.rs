@@ -45,3 +45,22 @@ impl Memory {
         self.planes[usize::from(at)][plane]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// No scene stores from the latches, so a load returns one, and only here all four are seen.
+    #[test]
+    fn every_load_fills_all_four_latches() {
+        let mut memory = Memory::default();
+        for plane in 0..4 {
+            memory.store(7, 20 + plane, 1 << plane);
+        }
+        for plane in 0..4 {
+            memory.latches = [0; 4];
+            memory.load(7, plane);
+            assert_eq!(memory.latches, [20, 21, 22, 23]);
+        }
+    }
+}

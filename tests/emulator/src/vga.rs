@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ptr::NonNull;
 
 use modex::registers::*;
-use modex::{Bus, Column, PAGE_BYTES, Purpose, STRIDE};
+use modex::{Bus, Column, PAGE_BYTES, PLANE_BYTES, Purpose, STRIDE};
 
 use crate::attribute::Attribute;
 use crate::crtc::Crtc;
@@ -385,6 +385,13 @@ impl Bus for Vga {
     }
 
     fn store64(&mut self, at: u16, bytes: u64) {
+        if !at.is_multiple_of(8) {
+            let state = "a wide store is aligned to its eight bytes".into();
+            self.note(
+                Access::Store(at, bytes as u8),
+                Err(("unaligned store", state)),
+            );
+        }
         for (i, byte) in (0..).zip(bytes.to_le_bytes()) {
             self.store(at.wrapping_add(i), byte);
         }
@@ -398,6 +405,11 @@ impl Bus for Vga {
     }
 
     fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        let last = usize::from(at) + usize::from(len.saturating_sub(1)) * STRIDE;
+        if last >= PLANE_BYTES {
+            let state = format!("a column of {len} ends at {last:X}h");
+            self.note(Access::Store(at, 0), Err(("store past the window", state)));
+        }
         let mut staging = vec![0; usize::from(len.saturating_sub(1)) * STRIDE + 1];
         let base = NonNull::from(&mut staging[..]).cast();
         // SAFETY: the staging bytes span the column, and nothing else reaches them meanwhile.

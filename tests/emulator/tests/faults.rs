@@ -53,7 +53,14 @@ fn registers_ports_and_values_that_no_scene_uses() {
     faults("unused register", "GR9", |v| v.out16(GRAPHICS, word(9, 0)));
     faults(unused, "CR13 = 50h", |v| v.out16(CRTC, word(0x13, 0x50)));
     faults(unused, "CR17 = C3h", |v| v.out16(CRTC, word(0x17, 0xC3)));
+    faults(unused, "CR11 = ADh", |v| v.out16(CRTC, word(0x11, 0xAD)));
     faults("unused register", "CR19", |v| v.out16(CRTC, word(0x19, 0)));
+    for address in [0x15, 0x50, 0x90] {
+        faults("unused register", &format!("AR{address:02X}"), |v| {
+            v.in8(INPUT_STATUS_1);
+            v.out8(ATTRIBUTE, address);
+        });
+    }
     faults(unused, "PEL Mask", |v| v.out8(PEL_MASK, 0x0F));
     faults("unused port", "3C3", |v| v.out8(0x3C3, 1));
     faults("unused port", "word write to 3C0", |v| {
@@ -68,17 +75,32 @@ fn registers_ports_and_values_that_no_scene_uses() {
 #[test]
 fn what_a_card_drops_or_garbles() {
     faults("write to a protected register", "CR00", |v| {
-        v.out16(CRTC, word(0, 0x5F))
+        v.out16(CRTC, word(0, 0x60));
+        assert_eq!(v.in8(CRTC + 1), 0x5F);
     });
     faults("palette is closed", "AR0", |v| {
         v.in8(INPUT_STATUS_1);
         v.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE);
         v.out8(ATTRIBUTE, 0);
     });
-    faults("DAC value is wider than 6 bits", "40h", |v| {
+    faults("DAC value is wider than 6 bits", "41h", |v| {
         v.out8(PEL_WRITE, 7);
-        v.out8(PEL_DATA, 0x40);
+        v.out8(PEL_DATA, 0x41);
+        v.out8(PEL_READ, 7);
+        assert_eq!(v.in8(PEL_DATA), 0x01);
     });
+    faults("DAC is not in read mode", "in 3C9h", |v| {
+        v.out8(PEL_WRITE, 7);
+        v.in8(PEL_DATA);
+    });
+    faults("DAC is not in write mode", "out 3C9h", |v| {
+        v.out8(PEL_READ, 7);
+        v.out8(PEL_DATA, 0);
+    });
+    faults("unaligned store", "A000:4B04", |v| v.store64(0x4B04, 0));
+    let mut vga = card();
+    vga.column(0xFFC0, 2, |column| column.fill(|| 0));
+    assert_eq!(vga.take_faults()[0].name, "store past the window");
     faults("address past the last page", "A000:E100", |v| {
         v.purpose(Purpose::Draw);
         v.column(0xE100, 1, |column| column.fill(|| 1));
@@ -152,7 +174,51 @@ fn what_a_fresh_card_does_not_take() {
         }),
         ["read of a register never written"]
     );
+    assert_eq!(
+        after(&|v| {
+            v.out8(PEL_READ, 0);
+            v.in8(PEL_DATA);
+        }),
+        ["colour was never written"]
+    );
     assert_eq!(after(&|v| v.store64(0, 0))[0], "memory is not unchained");
+    assert_eq!(
+        after(&|v| {
+            v.out16(SEQUENCER, word(4, 0x06));
+            v.column(0, 1, |column| column.fill(|| 0));
+        }),
+        ["register was never written"]
+    );
+}
+
+#[test]
+fn a_store_is_told_when_the_window_is_elsewhere() {
+    let mut vga = card();
+    vga.out16(GRAPHICS, word(6, 0x0D));
+    vga.column(0x5000, 1, |column| column.fill(|| 1));
+    let names: Vec<_> = vga.take_faults().iter().map(|fault| fault.name).collect();
+    assert_eq!(names, ["unused value", "window is not at A0000h"]);
+}
+
+#[test]
+fn what_is_like_a_fault_and_is_none() {
+    let mut vga = card();
+    // A page that is shown may be set up, and drawn on while the screen is off.
+    vga.column(0, 1, |column| column.fill(|| 1));
+    vga.out16(SEQUENCER, word(CLOCKING_MODE, 0x21));
+    vga.purpose(Purpose::Draw);
+    vga.column(0, 1, |column| column.fill(|| 1));
+    // PAS closes the palette registers, and no others.
+    vga.in8(INPUT_STATUS_1);
+    vga.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE | 0x10);
+    vga.out8(ATTRIBUTE, 0x41);
+    // Each block keeps its own index.
+    vga.out8(SEQUENCER, 4);
+    vga.out8(GRAPHICS, 5);
+    vga.out8(CRTC, 0x13);
+    let read = [SEQUENCER, GRAPHICS, CRTC].map(|port| vga.in8(port + 1));
+    assert_eq!(read, [0x06, 0x40, 0x28]);
+    assert_eq!(vga.take_faults(), []);
 }
 
 #[test]

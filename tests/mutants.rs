@@ -1,0 +1,359 @@
+//! Whether the checks of the emulated VGA and of the Mode X driver can fail: `cargo named-mutants`.
+//!
+//! A mutant is one mistake that could be made, planted into a copy of the workspace: in the driver,
+//! or in the card that should find the driver's mistakes out. The tests of `emulator` and `modex`
+//! are run there, and one of them at least must fail: where a mutant survives a test is missing.
+//!
+//! A mutant names its place by the exact text, which must be in the file once. Every `cargo test`
+//! checks that, so the list can't rot.
+
+use std::fs::{self, File};
+use std::os::unix::process::CommandExt;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+use crystal_ball::child;
+use rustix::process::{Pid, Signal, kill_process_group};
+use tempfile::TempDir;
+
+/// A mistake to plant: in `file`, `from` becomes `to`.
+struct Mutant {
+    name: &'static str,
+    file: &'static str,
+    from: &'static str,
+    to: &'static str,
+}
+
+const ATTRIBUTE: &str = "tests/emulator/src/attribute.rs";
+const CRTC: &str = "tests/emulator/src/crtc.rs";
+const DAC: &str = "tests/emulator/src/dac.rs";
+const MEMORY: &str = "tests/emulator/src/memory.rs";
+const SCANOUT: &str = "tests/emulator/src/scanout.rs";
+const SEQUENCER: &str = "tests/emulator/src/sequencer.rs";
+const VGA: &str = "tests/emulator/src/vga.rs";
+const DRIVER: &str = "kernel/modex/src/driver.rs";
+const REGISTERS: &str = "kernel/modex/src/registers.rs";
+
+/// Columns: name; file; text; what it becomes.
+#[rustfmt::skip]
+const MUTANTS: &[Mutant] = &[
+    // The driver.
+    mutant("Map Mask dropped", DRIVER,
+        "write(self.bus, SEQUENCER, MAP_MASK, 1 << (x & 3));", ""),
+    mutant("wrong plane order in the driver", DRIVER,
+        "1 << (x & 3)", "8 >> (x & 3)"),
+    mutant("protection not cleared", DRIVER,
+        "[usize::from(VERTICAL_RETRACE_END)] & !PROTECT;", "[usize::from(VERTICAL_RETRACE_END)];"),
+    mutant("a page flipped before it is drawn", DRIVER,
+        "self.bus.purpose(Purpose::Erase);", "self.flip(); self.bus.purpose(Purpose::Erase);"),
+    mutant("SR4 left at chain-4", REGISTERS,
+        "[0x03, 0x01, ALL_PLANES, 0x00, 0x06]", "[0x03, 0x01, ALL_PLANES, 0x00, 0x0E]"),
+    mutant("erase too small by one line at the bottom", DRIVER,
+        ".max(y + len);", ".max(y + len - 1);"),
+    mutant("erase too small by one line at the top", DRIVER,
+        "self.top[group].min(y);", "self.top[group].min(y + 1);"),
+    mutant("erase reaches one plane", DRIVER,
+        "write(&mut self.bus, SEQUENCER, MAP_MASK, ALL_PLANES);",
+        "write(&mut self.bus, SEQUENCER, MAP_MASK, 1);"),
+    mutant("wait for the retrace skipped", DRIVER,
+        "self.bus.purpose(Purpose::Flip);\n        self.wait_for_retrace();",
+        "self.bus.purpose(Purpose::Flip);"),
+    mutant("a page that may be on the screen not waited for", DRIVER,
+        "if self.visible[self.back] {", "if false {"),
+    mutant("flip written at any time", DRIVER,
+        "self.bus.purpose(Purpose::Flip);\n        self.wait_for_display();",
+        "self.bus.purpose(Purpose::Flip);"),
+    mutant("mode set waits for no frame", DRIVER,
+        "        self.wait_for_display();\n        self.wait_for_retrace();\n", ""),
+    mutant("two pages, not three", DRIVER,
+        "self.back = (self.back + 1) % PAGES;", "self.back = (self.back + 1) % 2;"),
+    mutant("DISPI left enabled", DRIVER,
+        "bus.out16(DISPI_DATA, 0);", ""),
+    mutant("clock changed without reset", DRIVER,
+        "write(bus, SEQUENCER, RESET, 0x01);", ""),
+    mutant("sequencer left in reset", DRIVER,
+        "write(bus, SEQUENCER, RESET, mode.sequencer[usize::from(RESET)]);", ""),
+    mutant("screen left off", DRIVER,
+        "write(bus, SEQUENCER, CLOCKING_MODE, clocking);", ""),
+    mutant("screen on over old memory", DRIVER,
+        "write(bus, SEQUENCER, index, value | off);",
+        "write(bus, SEQUENCER, index, value & !off);"),
+    mutant("half of the planes not cleared", DRIVER,
+        "(0..PLANE_BYTES).step_by(", "(0..PLANE_BYTES / 2).step_by("),
+    mutant("flip-flop of the attribute controller not reset", DRIVER,
+        "bus.in8(INPUT_STATUS_1);\n    for (index, &value)", "for (index, &value)"),
+    mutant("PAS left 0", DRIVER,
+        "bus.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE);\n    mode", "mode"),
+    mutant("palette off by one", DRIVER,
+        "bus.out8(PEL_WRITE, 0);", "bus.out8(PEL_WRITE, 1);"),
+    mutant("palette read back off by one", DRIVER,
+        "self.bus.out8(PEL_READ, 0);", "self.bus.out8(PEL_READ, 1);"),
+    mutant("Read Map not written", DRIVER,
+        "write(&mut self.bus, GRAPHICS, READ_MAP, plane);", "let plane: u8 = plane;"),
+    mutant("Read Map left set", DRIVER,
+        "write(&mut self.bus, GRAPHICS, READ_MAP, read_map);", ""),
+    mutant("doubleword addresses", REGISTERS,
+        "0x00, 0xE7, 0x06, // Byte", "0x40, 0xE7, 0x06, // Byte"),
+    // The emulated card.
+    mutant("latches not loaded", MEMORY,
+        "self.latches = self.planes[usize::from(at)];", "let _ = at;"),
+    mutant("only the latch that is read loaded", MEMORY,
+        "self.latches = self.planes[usize::from(at)];",
+        "self.latches[usize::from(plane)] = self.planes[usize::from(at)][usize::from(plane)];"),
+    mutant("Read Map ignored", MEMORY,
+        "self.latches[usize::from(plane & 3)]", "self.latches[usize::from(plane & 0)]"),
+    mutant("Map Mask ignored", MEMORY,
+        "map_mask >> plane & 1 == 1", "map_mask >> plane & 1 <= 1"),
+    mutant("start address not latched", CRTC,
+        "        self.latched\n", "        self.start_address()\n"),
+    mutant("start address never taken over again", CRTC,
+        "self.latched = self.start_address();",
+        "self.latched = self.latched.or(self.start_address());"),
+    mutant("CRTC protect ignored", CRTC,
+        "if index <= 7 && protected {", "if false && index <= 7 && protected {"),
+    mutant("CRTC protect told, and the write taken", CRTC,
+        "            // The chip drops the write, but for CR7 bit 4.\n",
+        "            self.registers[usize::from(index)] = Some(value);\n"),
+    mutant("off by one in scan lines", CRTC,
+        "ninth_and_tenth(1, 6)) + 1;", "ninth_and_tenth(1, 6));"),
+    mutant("off by one in the lines of a frame", CRTC,
+        "ninth_and_tenth(0, 5)) + 2;", "ninth_and_tenth(0, 5)) + 1;"),
+    mutant("8-bit DAC", DAC,
+        "Some(value & 0x3F);
+        self.write = Some(next(entry, part));
+        match value {
+            0..=0x3F => Ok(()),",
+        "Some(value);
+        self.write = Some(next(entry, part));
+        match value {
+            0..=0xFF => Ok(()),"),
+    mutant("8-bit DAC, told", DAC,
+        "Some(value & 0x3F);", "Some(value);"),
+    mutant("DAC read index does not step", DAC,
+        "self.read = Some(next(entry, part));", ""),
+    mutant("DAC write index steps with each part", DAC,
+        "        2 => (entry", "        0..3 => (entry"),
+    mutant("wrong plane order in the scan-out", SCANOUT,
+        "peek(x & 3, at)", "peek(3 - (x & 3), at)"),
+    mutant("lines doubled twice", SCANOUT,
+        "line / self.repeat * self.width", "line / 2 / self.repeat * self.width"),
+    mutant("address does not wrap within the plane", SCANOUT,
+        "start.wrapping_add(offset as u16)", "start.saturating_add(offset as u16)"),
+    mutant("PAS ignored", ATTRIBUTE,
+        "if address & PALETTE_ADDRESS_SOURCE != 0 => {}", "if address < 0xFF => {}"),
+    mutant("flip-flop does not flip", ATTRIBUTE,
+        "std::mem::replace(expects_data, !*expects_data)", "*expects_data"),
+    mutant("chain-4 not seen", SEQUENCER,
+        "Some(UNCHAINED) => Ok(()),", "Some(_) => Ok(()),"),
+    mutant("reset of the sequencer not seen", SEQUENCER,
+        "!= Some(RUNNING) {", "== None {"),
+    mutant("store to a page that is seen not noticed", VGA,
+        "(self.crtc.shown_address(), \"is on the screen\"),", ""),
+    mutant("store to a page that will be seen not noticed", VGA,
+        "(self.crtc.start_address(), \"will be on the screen\"),", ""),
+    mutant("DISPI not noticed", VGA,
+        "dispi: true,", "dispi: false,"),
+    mutant("faults forgotten with the card", VGA,
+        "if !self.faults.is_empty() && ", "if false && "),
+];
+
+const fn mutant(
+    name: &'static str,
+    file: &'static str,
+    from: &'static str,
+    to: &'static str,
+) -> Mutant {
+    Mutant {
+        name,
+        file,
+        from,
+        to,
+    }
+}
+
+impl Mutant {
+    /// The file with the mistake in it.
+    fn planted(&self, source: &str) -> Result<String, String> {
+        match source.matches(self.from).count() {
+            1 => Ok(source.replacen(self.from, self.to, 1)),
+            found => Err(format!(
+                "mutant \"{}\": its text is in {} {found} times, not once:\n{}",
+                self.name, self.file, self.from
+            )),
+        }
+    }
+}
+
+/// The most that one run of cargo may take: a hundred times what it does.
+const LIMIT: Duration = Duration::from_secs(300);
+
+#[test]
+fn every_mutant_has_its_place_in_the_source() {
+    let wrong: Vec<_> = MUTANTS
+        .iter()
+        .filter_map(|mutant| {
+            let source = fs::read_to_string(root().join(mutant.file)).unwrap();
+            mutant.planted(&source).err()
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+#[ignore = "builds and tests for minutes, once for each mutant; by `cargo named-mutants`"]
+fn every_mutant_is_killed() {
+    let copy = Copy::new();
+    let run = copy.cargo(&["test"]);
+    assert!(run.well, "without a mutant:\n{}", run.output);
+    let (mut survivors, mut errors) = (Vec::new(), Vec::new());
+    for (i, mutant) in (1..).zip(MUTANTS) {
+        let fate = copy.fate(mutant);
+        let told = match &fate {
+            Fate::Killed(tests) => match tests.len() {
+                1 => format!("killed by {}", tests[0]),
+                n => format!("killed by {} and {} more", tests[0], n - 1),
+            },
+            Fate::Survived => "SURVIVED".to_owned(),
+            Fate::Error(error) => format!("ERROR: {error}"),
+        };
+        println!("{i}/{} {}: {told}", MUTANTS.len(), mutant.name);
+        match fate {
+            Fate::Killed(_) => {}
+            Fate::Survived => survivors.push(mutant.name),
+            Fate::Error(_) => errors.push(mutant.name),
+        }
+    }
+    assert!(
+        survivors.is_empty() && errors.is_empty(),
+        "survived: {survivors:?}; in error: {errors:?}"
+    );
+}
+
+/// What became of a mutant.
+enum Fate {
+    /// By these tests.
+    Killed(Vec<String>),
+    Survived,
+    /// It says nothing about the tests.
+    Error(String),
+}
+
+/// A copy of the workspace, with a target folder of its own that all mutants share.
+struct Copy {
+    folder: TempDir,
+}
+
+/// How a run of cargo ended.
+struct Run {
+    well: bool,
+    output: String,
+}
+
+impl Copy {
+    /// The files that git knows or would add, as they are now.
+    fn new() -> Self {
+        let mut git = Command::new("git");
+        git.args([
+            "ls-files",
+            "-z",
+            "--cached",
+            "--others",
+            "--exclude-standard",
+        ]);
+        let files = git.current_dir(root()).output().expect("git runs");
+        assert!(files.status.success(), "git ls-files: {files:?}");
+        let copy = Self {
+            folder: tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap(),
+        };
+        let files = String::from_utf8(files.stdout).unwrap();
+        for file in files.split_terminator('\0') {
+            let from = root().join(file);
+            // One that was deleted is still known.
+            if from.exists() {
+                let to = copy.source(file);
+                fs::create_dir_all(to.parent().unwrap()).unwrap();
+                fs::copy(from, to).unwrap();
+            }
+        }
+        copy
+    }
+
+    fn source(&self, file: &str) -> PathBuf {
+        self.folder.path().join("source").join(file)
+    }
+
+    /// Plants the mutant, tests, and takes it out again.
+    fn fate(&self, mutant: &Mutant) -> Fate {
+        let file = self.source(mutant.file);
+        let source = fs::read_to_string(&file).unwrap();
+        let planted = match mutant.planted(&source) {
+            Ok(planted) => planted,
+            Err(error) => return Fate::Error(error),
+        };
+        fs::write(&file, planted).unwrap();
+        let built = self.cargo(&["test", "--no-run"]);
+        let tested = built.well.then(|| self.cargo(&["test", "--no-fail-fast"]));
+        fs::write(&file, source).unwrap();
+        let Some(tested) = tested else {
+            return Fate::Error(format!("it does not compile:\n{}", built.output));
+        };
+        if tested.well {
+            return Fate::Survived;
+        }
+        let killers: Vec<_> = tested.output.lines().filter_map(failed).collect();
+        if killers.is_empty() {
+            return Fate::Error(format!("no test failed by name:\n{}", tested.output));
+        }
+        Fate::Killed(killers)
+    }
+
+    /// Cargo in the copy, on the two crates.
+    fn cargo(&self, arguments: &[&str]) -> Run {
+        let told = self.folder.path().join("output");
+        let output = File::create(&told).unwrap();
+        let mut cargo = child::family(env!("CARGO"));
+        cargo
+            .args(arguments)
+            .args(["--offline", "--package=emulator", "--package=modex"])
+            .arg("--target-dir")
+            .arg(self.folder.path().join("target"))
+            .current_dir(self.source(""))
+            .stdin(Stdio::null())
+            .stdout(output.try_clone().unwrap())
+            .stderr(output);
+        // A group of its own, so that a test that hangs ends with the cargo that started it.
+        let mut cargo = cargo.process_group(0).spawn().expect("cargo runs");
+        let by = Instant::now() + LIMIT;
+        let status = loop {
+            if let Some(status) = cargo.try_wait().unwrap() {
+                break Some(status);
+            }
+            if Instant::now() > by {
+                // It may have ended just now; then there is no group to kill.
+                let _ = kill_process_group(Pid::from_child(&cargo), Signal::KILL);
+                cargo.wait().unwrap();
+                break None;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        };
+        let mut output = fs::read_to_string(told).unwrap();
+        if status.is_none() {
+            output.push_str("\nstopped: it took too long\n");
+        }
+        Run {
+            well: status.is_some_and(|status| status.success()),
+            output,
+        }
+    }
+}
+
+/// The name of the test that a line of libtest's says has failed.
+fn failed(line: &str) -> Option<String> {
+    let name = line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?;
+    Some(name.trim_end_matches(" - should panic").to_owned())
+}
+
+fn root() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
+}
