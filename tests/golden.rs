@@ -150,7 +150,7 @@ fn counted_instructions_change_no_byte() {
 /// The wide set, by `cargo wide`: each configuration with every golden, a hundred boots, eight at
 /// once.
 #[test]
-#[ignore = "takes about ten minutes; run it by `cargo wide`"]
+#[ignore = "takes about four minutes; run it by `cargo wide`"]
 fn wide_set() {
     LazyLock::force(&READY);
     let goldens = goldens();
