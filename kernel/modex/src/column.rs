@@ -41,6 +41,33 @@ impl Column<'_> {
         }
     }
 
+    /// The first `rows` pixels, and those after them.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    pub fn split(self, rows: u16) -> (Self, Self) {
+        assert!(rows <= self.len, "{rows} of {} pixels", self.len);
+        let Self { base, len, lent } = self;
+        // The last pixel may be the last byte of what is lent: no pointer goes past it.
+        let after = match rows < len {
+            // SAFETY: `rows < len`, so by the contract of `new` the address is inside.
+            true => unsafe { base.add(usize::from(rows) * STRIDE) },
+            false => base,
+        };
+        let (first, second) = (rows, len - rows);
+        let first = Self {
+            base,
+            len: first,
+            lent,
+        };
+        let second = Self {
+            base: after,
+            len: second,
+            lent,
+        };
+        (first, second)
+    }
+
     /// Writes every pixel from the top down; `texel` is called once for each.
     #[inline(always)]
     pub fn fill(self, mut texel: impl FnMut() -> u8) {

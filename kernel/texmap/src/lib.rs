@@ -12,10 +12,13 @@
 
 pub mod affine;
 pub mod coverage;
+pub mod exact;
 mod job;
+pub mod plane;
 mod polygon;
 mod renderer;
 
 pub use job::{ColumnJob, JobList};
+pub use plane::Plane;
 pub use polygon::{MAX_COORDINATE, MAX_SIDES, SUBPIXELS, Texture, TextureError, Vertex};
 pub use renderer::{Renderer, Stats};

@@ -1,0 +1,174 @@
+//! A texture's plane in space, as three linear forms of the screen.
+//!
+//! A polygon's texture lies in the plane P + uM + vN of the viewer's space. The ray through a
+//! pixel is t d with d = (i, j, f): the pixel's place from the middle of the screen, and the focal
+//! length. Where they meet, t d = P + uM + vN, and eliminating two unknowns at a time leaves
+//!
+//! ```text
+//! u = a / c    v = b / c    a = d . (N x P)    b = d . (P x M)    c = d . (M x N)
+//! ```
+//!
+//! which are linear in i and j. P, M and N need not be found at all. With three points V of the
+//! plane and their texture coordinates, and L = d . (V' x V'') for each point and the two after it,
+//! the same three forms are, but for a factor that the quotients do not see,
+//!
+//! ```text
+//! a = sum of u L    b = sum of v L    c = sum of L
+//! ```
+//!
+//! for L is the weight of its point where the ray meets the plane. This needs no division, and
+//! nothing in it is special when the texture's own axes are.
+//!
+//! # The integers
+//!
+//! The sums are exact: below 2^92 for points within [`MAX_POSITION`]. They are then cut to 61 bits
+//! once, by one shift for all nine coefficients, each rounded to nearest (half up). A form's value
+//! is off by at most [`ROUNDING`] then. From here on there is no rounding: the texel *is* the floor
+//! of the quotient of those integers.
+
+use modex::{HEIGHT, WIDTH};
+
+/// Furthest coordinate of a point, either sign: 256 units in 16.16.
+pub const MAX_POSITION: i32 = 1 << 24;
+/// Largest focal length in pixels.
+pub const MAX_FOCAL_LENGTH: i32 = 1 << 15;
+/// Most that rounding the coefficients moves a form's value, in units of its last place: half a
+/// unit for the origin, and for each step to the right and down.
+pub const ROUNDING: i64 = (WIDTH + HEIGHT).div_ceil(2) as i64;
+
+/// Bits of a form's value on the screen. A value and 256 times another's are compared, and their
+/// difference fits 63 bits.
+const BITS: u32 = 61;
+
+/// A point of the plane with its place in the texture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Anchor {
+    /// In the viewer's space: x right, y down, z away, 16.16, within +-[`MAX_POSITION`].
+    pub position: [i32; 3],
+    /// Across the texture, 16.16 texels, 0 to 256.
+    pub u: i32,
+    /// Down the texture, 16.16 texels, 0 to 256.
+    pub v: i32,
+}
+
+/// A linear form of the screen: its value at a pixel's centre.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Form {
+    /// At the centre of pixel (0, 0).
+    pub origin: i64,
+    /// From a pixel to the one right of it.
+    pub right: i64,
+    /// From a pixel to the one below it.
+    pub down: i64,
+}
+
+impl Form {
+    /// The value at the centre of a pixel of the screen.
+    pub fn at(&self, x: u16, y: u16) -> i64 {
+        self.origin + self.right * i64::from(x) + self.down * i64::from(y)
+    }
+}
+
+/// The three forms: u = a / c and v = b / c, in texels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Plane {
+    /// Numerator of u.
+    pub a: Form,
+    /// Numerator of v.
+    pub b: Form,
+    /// Their denominator; above zero where the plane lies before the eye.
+    pub c: Form,
+}
+
+/// A form before it is cut: at pixel (0, 0), and the steps to the right and down.
+type Exact = [i128; 3];
+
+impl Plane {
+    /// The plane through three points.
+    ///
+    /// Three points on a line, or a plane through the eye, give forms as well: what is seen of
+    /// such a polygon is decided by [`texel`], as everywhere.
+    ///
+    /// # Panics
+    /// In a build with overflow checks, if a position or the focal length is out of its range.
+    pub fn new(anchors: &[Anchor; 3], focal_length: i32) -> Self {
+        let [v0, v1, v2] = anchors.map(|anchor| anchor.position.map(i128::from));
+        let weights = [cross(v1, v2), cross(v2, v0), cross(v0, v1)];
+        let sum = |factors: [i128; 3]| {
+            [0, 1, 2].map(|k| (0..3).map(|i| factors[i] * weights[i][k]).sum::<i128>())
+        };
+        // c has the sixteen bits that u and v bring into a and b.
+        let vectors = [
+            sum(anchors.map(|anchor| i128::from(anchor.u))),
+            sum(anchors.map(|anchor| i128::from(anchor.v))),
+            sum([1 << 16; 3]),
+        ];
+        // The sign of the volume is that of c before the eye.
+        let volume: i128 = (0..3).map(|k| v0[k] * weights[0][k]).sum();
+        let sign = if volume < 0 { -1 } else { 1 };
+        let forms = vectors.map(|vector| on_screen(vector.map(|k| sign * k), focal_length));
+        let [a, b, c] = forms.map(|form| largest(&form));
+        let bits = 128 - a.max(b).max(c << 8).leading_zeros();
+        let shift = bits.saturating_sub(BITS);
+        let [a, b, c] = forms.map(|form| {
+            let [origin, right, down] = form.map(|n| cut(n, shift));
+            Form {
+                origin,
+                right,
+                down,
+            }
+        });
+        Self { a, b, c }
+    }
+}
+
+/// The texel of a coordinate whose quotient is `n / c`: its floor, in a texture of `size` texels.
+/// Outside of it the nearest; on the horizon and beyond, where c is not above zero, the one that
+/// the last pixels before it come to.
+///
+/// `size` is at most 256, and the values are those of a [`Plane`]'s forms on the screen.
+pub fn texel(n: i64, c: i64, size: u16) -> u16 {
+    let size = i64::from(size);
+    if n < 0 {
+        0
+    } else if n >= size * c {
+        (size - 1) as u16
+    } else {
+        (n / c) as u16
+    }
+}
+
+fn cross(a: [i128; 3], b: [i128; 3]) -> [i128; 3] {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
+/// `vector . d` as a form. The centre of pixel (x, y) is at (x + 1/2, y + 1/2), and the middle of
+/// the screen is the corner between four pixels: twice d is whole.
+fn on_screen(vector: [i128; 3], focal_length: i32) -> Exact {
+    let [i, j, k] = vector;
+    let (left, top) = (1 - WIDTH as i128, 1 - HEIGHT as i128);
+    [
+        left * i + top * j + 2 * i128::from(focal_length) * k,
+        2 * i,
+        2 * j,
+    ]
+}
+
+/// The largest magnitude of a form on the screen: that of a corner.
+fn largest(form: &Exact) -> u128 {
+    let [origin, right, down] = form;
+    let (last_x, last_y) = (WIDTH as i128 - 1, HEIGHT as i128 - 1);
+    let corners = [(0, 0), (last_x, 0), (0, last_y), (last_x, last_y)];
+    let at = |(x, y): (i128, i128)| (origin + right * x + down * y).unsigned_abs();
+    corners.into_iter().map(at).max().unwrap_or(0)
+}
+
+/// `n / 2^shift`, rounded to nearest, half up.
+fn cut(n: i128, shift: u32) -> i64 {
+    let half = (1 << shift) >> 1;
+    ((n + half) >> shift) as i64
+}
