@@ -3,7 +3,6 @@
 //! Each test boots a machine of its own, so that one failure leaves the others alone; set-up is
 //! one locked step that all of them take.
 
-use std::collections::HashSet;
 use std::fs::File;
 use std::io::{BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -13,17 +12,12 @@ use std::process::{Command as Process, Output, Stdio};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use crystal_ball::card::Card;
+use crystal_ball::card::{Card, Emulated};
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
-use crystal_ball::screen::Screen;
 use crystal_ball::setup::{self, Options, Ready};
-use emulator::Vga;
-use emulator::scanout;
 use link::{Command, Fault, Picture};
-use modex::ModeX;
 use modex::registers::MODE_X;
-use scene::{Pose, Stage, Storage};
-use texmap::Stats;
+use show::Memory;
 
 static READY: LazyLock<Ready> =
     LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
@@ -40,37 +34,6 @@ fn boot() -> Machine {
 fn verdict<T: std::fmt::Debug>(result: anyhow::Result<T>) -> Failure {
     let error = result.expect_err("the run ended well");
     error.downcast().expect("a failure with a verdict")
-}
-
-/// What the emulated card shows for each frame, one after the other, and what drawing it took.
-///
-/// Driver and renderer are the kernel's; the card is the host's, and every fault it notes fails
-/// the test.
-fn emulate(frames: &[u32]) -> Vec<(Screen, Stats)> {
-    let mut texels = Box::new([0; scene::TEXELS]);
-    let textures = [scene::paint_ball(&mut texels)];
-    let scene = scene::ball(&textures);
-    let mut storage = Box::new(Storage::new());
-    let mut stage = Stage::new(&mut storage, scene);
-    let mut card = ModeX::set(Vga::new(), scene.palette).unwrap();
-    let picture = |&frame: &u32| {
-        let mut canvas = card.begin(scene.background);
-        let stats = stage.draw(&Pose::at_tick(frame), &mut canvas);
-        card.flip();
-        card.settle();
-        (as_qemu_shows(card.bus().scan_out().unwrap()), stats)
-    };
-    frames.iter().map(picture).collect()
-}
-
-/// A picture with its six bits a colour widened to eight as QEMU's DAC does.
-fn as_qemu_shows(picture: scanout::Picture) -> Screen {
-    let widen = |colour: [u8; 3]| colour.map(|v| (v << 2) | ((v & 1) * 3));
-    Screen {
-        width: picture.width,
-        height: picture.height,
-        pixels: picture.dots.into_iter().map(widen).collect(),
-    }
 }
 
 #[test]
@@ -97,101 +60,6 @@ fn the_registers_read_back_as_the_table_says() {
         assert_eq!(read, expected, "{block}");
     }
     assert_eq!(answer.len(), MODE_X.blocks().len());
-    machine.leave().unwrap();
-}
-
-/// Frames in an order that puts different pictures on the same page, and the same picture on
-/// different pages: after any order a page is what a cleared one would be.
-#[test]
-fn every_page_shows_what_the_emulated_card_shows() {
-    let frames = [
-        0,
-        1000,
-        u32::MAX,
-        0,
-        360,
-        90,
-        90,
-        90,
-        90,
-        180,
-        7,
-        u32::MAX,
-        0,
-    ];
-    let expected = emulate(&frames);
-    let mut machine = boot();
-    for (i, (frame, (picture, _))) in frames.iter().zip(&expected).enumerate() {
-        let answer = machine.ask(Command::Show(Picture::Frame(*frame))).unwrap();
-        assert_eq!(answer, [format!("page {}", (i + 1) % 3)]);
-        assert_same(
-            &machine.screen().unwrap(),
-            picture,
-            &format!("frame {frame}"),
-        );
-    }
-    machine.leave().unwrap();
-    // Three pictures of a scene, and not one of them three times, nor a blank one.
-    let colours: Vec<_> = expected[..3]
-        .iter()
-        .map(|(p, _)| p.pixels.iter().collect::<HashSet<_>>().len())
-        .collect();
-    assert!(
-        colours.iter().all(|&count| count > 60),
-        "{colours:?} colours"
-    );
-    for (a, b) in [(0, 1), (1, 2), (0, 2)] {
-        assert!(
-            expected[a].0 != expected[b].0,
-            "{a} and {b} are the same picture"
-        );
-    }
-}
-
-fn assert_same(shown: &Screen, drawn: &Screen, what: &str) {
-    assert_eq!(
-        (shown.width, shown.height),
-        (drawn.width, drawn.height),
-        "{what}"
-    );
-    let pairs = shown.pixels.iter().zip(&drawn.pixels).enumerate();
-    let mut differ = pairs.filter(|(_, (a, b))| a != b);
-    if let Some((i, (a, b))) = differ.next() {
-        let (x, y) = (i % drawn.width / 2, i / drawn.width / 2);
-        let count = differ.count() + 1;
-        panic!("{what}: {count} of 307200 differ, the first is ({x}, {y}): {a:?}, not {b:?}");
-    }
-}
-
-#[test]
-fn map_mask_is_written_once_for_each_column() {
-    let mut machine = boot();
-    for (frame, (_, stats)) in [0, 1000, u32::MAX]
-        .iter()
-        .zip(emulate(&[0, 1000, u32::MAX]))
-    {
-        machine.ask(Command::Show(Picture::Frame(*frame))).unwrap();
-        let counts = machine.ask(Command::Counts).unwrap();
-        let number = |line: &str, name: &str| -> u32 {
-            let line = counts
-                .iter()
-                .find(|l| l.split(' ').next() == Some(line))
-                .unwrap();
-            let mut words = line.split(' ').skip_while(|word| *word != name);
-            words.nth(1).unwrap().parse().unwrap()
-        };
-        assert_eq!(number("picture", "columns"), stats.columns);
-        assert_eq!(number("draw", "map-mask"), stats.columns);
-        assert_eq!(number("draw", "ports"), stats.columns);
-        assert_eq!(number("draw", "bytes"), stats.pixels);
-        assert_eq!(number("picture", "pixels"), stats.pixels);
-        assert!(number("erase", "map-mask") <= 1);
-        assert_eq!(number("flip", "ports"), 1);
-        assert_eq!(
-            (number("picture", "dropped"), number("picture", "full")),
-            (0, 0)
-        );
-    }
     machine.leave().unwrap();
 }
 
@@ -477,13 +345,14 @@ fn without_a_display_a_picture_is_left() {
         (640, 480, 3 * 640)
     );
     // It is the picture of some tick of the first minute, from edge to edge.
-    let expected = (0..60).flat_map(|second| {
-        let frames: Vec<_> = (second * 60..(second + 1) * 60).collect();
-        emulate(&frames)
-    });
-    let mut expected = expected.map(|(picture, _)| picture);
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut is_of = |frame| {
+        emulated.ask(Command::Show(Picture::Frame(frame))).unwrap();
+        emulated.screen().unwrap().pixels.as_flattened() == bytes
+    };
     assert!(
-        expected.any(|picture| picture.pixels.as_flattened() == bytes),
+        (0..3600).any(&mut is_of),
         "the picture is none of the show's"
     );
 }
