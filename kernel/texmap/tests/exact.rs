@@ -68,44 +68,65 @@ fn generator() -> fastrand::Rng {
     fastrand::Rng::with_seed(seed)
 }
 
-fn side(random: &mut fastrand::Rng) -> u16 {
-    match random.u8(0..4) {
-        0 => random.u16(1..=4),
-        1 => 1 << random.u16(0..=8),
-        _ => random.u16(1..=256),
+/// A texture whose texels tell their column, and one whose texels tell their row.
+struct Axes {
+    size: (u16, u16),
+    texels: [Vec<u8>; 2],
+}
+
+impl Axes {
+    /// A few dozen sizes: powers of two and not, single texels, the largest, any.
+    fn some(random: &mut fastrand::Rng) -> Vec<Self> {
+        let side = |random: &mut fastrand::Rng| match random.u8(0..4) {
+            0 => random.u16(1..=4),
+            1 => 1 << random.u16(0..=8),
+            _ => random.u16(1..=256),
+        };
+        let sizes = (0..40).map(|_| (side(random), side(random)));
+        let sizes = sizes.chain([(1, 1), (256, 256), (255, 1)]);
+        let axes = |size: (u16, u16)| {
+            let axis = |of: fn(u16, u16) -> u16| {
+                let rows = (0..size.1).flat_map(|j| (0..size.0).map(move |i| of(i, j) as u8));
+                rows.collect::<Vec<u8>>()
+            };
+            Self {
+                size,
+                texels: [axis(|i, _| i), axis(|_, j| j)],
+            }
+        };
+        sizes.map(axes).collect()
+    }
+
+    /// Draws a column with each, and gives the texels by column and row.
+    fn draw(
+        &self,
+        page: &mut PlanarBuffer,
+        plane: &Plane,
+        (x, y, len): (u16, u16, u16),
+    ) -> [Vec<u8>; 2] {
+        [&self.texels[0], &self.texels[1]].map(|texels| {
+            let texture = Texture::new(texels, self.size.0, self.size.1).unwrap();
+            let walk = exact::Walk::new(plane, x, y);
+            page.column(x, y, len, |column| {
+                exact::column(&texture, walk, len, column)
+            });
+            let rows = y..y + len;
+            rows.map(|y| page.pixel(x.into(), y.into())).collect()
+        })
     }
 }
 
-/// Draws a column twice, once with textures that tell the texel's column and once its row.
-fn texels(plane: &Plane, size: (u16, u16), (x, y, len): (u16, u16, u16)) -> Vec<(u8, u8)> {
-    let (width, height) = size;
-    let axis = |of: fn(u16, u16) -> u16| {
-        let rows = (0..height).flat_map(|j| (0..width).map(move |i| of(i, j) as u8));
-        rows.collect::<Vec<u8>>()
-    };
+/// Compares at least so many samples with the definition; how many were clamped.
+fn compare(least: u64, random: &mut fastrand::Rng) -> (u64, u64) {
+    let textures = Axes::some(random);
     let mut page = PlanarBuffer::new();
-    let mut draw = |texels: &[u8]| {
-        let texture = Texture::new(texels, width, height).unwrap();
-        page.column(x, y, len, |column| {
-            exact::column(&texture, exact::Walk::new(plane, x, y), len, column);
-        });
-        (y..y + len)
-            .map(|y| page.pixel(x.into(), y.into()))
-            .collect::<Vec<u8>>()
-    };
-    let (u, v) = (draw(&axis(|i, _| i)), draw(&axis(|_, j| j)));
-    u.into_iter().zip(v).collect()
-}
-
-#[test]
-fn every_texel_is_the_floor_of_the_quotient() {
-    let mut random = generator();
-    let (mut samples, mut clamped) = (0u32, 0u32);
-    for case in 0..30_000 {
-        let size = (side(&mut random), side(&mut random));
+    let (mut samples, mut clamped, mut case) = (0, 0, 0);
+    while samples < least {
+        case += 1;
+        let axes = &textures[random.usize(..textures.len())];
         // From the eye to 256 units, in one polygon.
         let deepest = [24, 16, 12][case % 3];
-        let mut anchors = [(); 3].map(|()| anchor(&mut random, 7, deepest, size));
+        let mut anchors = [(); 3].map(|()| anchor(random, 7, deepest, axes.size));
         match case % 16 {
             // Through the eye, on a line, in one point.
             0 => anchors[2].position = [0; 3],
@@ -119,20 +140,43 @@ fn every_texel_is_the_floor_of_the_quotient() {
             _ => {}
         }
         let plane = Plane::new(&anchors, FOCAL_LENGTH);
-        let (x, y) = (random.u16(0..320), random.u16(0..240));
-        let len = random.u16(1..=240 - y);
-        let forms = |y| [plane.a, plane.b, plane.c].map(|form| i128::from(form.at(x, y)));
-        for (y, (u, v)) in (y..).zip(texels(&plane, size, (x, y, len))) {
-            let [a, b, c] = forms(y);
-            let (w, h) = (i128::from(size.0), i128::from(size.1));
-            let expected = (texel(a, c, w), texel(b, c, h));
-            assert_eq!((u, v), expected, "({x}, {y}) of {anchors:?} on {size:?}");
-            samples += 1;
-            clamped += u32::from(a < 0 || b < 0 || a >= w * c || b >= h * c);
+        let (w, h) = axes.size;
+        // Several columns of each plane: making one takes longer than drawing.
+        for _ in 0..4 {
+            let (x, y) = (random.u16(0..320), random.u16(0..240));
+            let len = random.u16(1..=240 - y);
+            let [us, vs] = axes.draw(&mut page, &plane, (x, y, len));
+            for (y, (u, v)) in (y..).zip(us.into_iter().zip(vs)) {
+                let [a, b, c] = [plane.a, plane.b, plane.c].map(|form| i128::from(form.at(x, y)));
+                let (w, h) = (i128::from(w), i128::from(h));
+                let expected = (texel(a, c, w), texel(b, c, h));
+                assert_eq!((u, v), expected, "({x}, {y}) of {anchors:?} on {w} x {h}");
+                samples += 1;
+                clamped += u64::from(a < 0 || b < 0 || a >= w * c || b >= h * c);
+            }
         }
     }
+    (samples, clamped)
+}
+
+#[test]
+fn every_texel_is_the_floor_of_the_quotient() {
+    let (samples, clamped) = compare(4_000_000, &mut generator());
     println!("{samples} samples, {clamped} of them clamped");
-    assert!(samples > 1_000_000 && clamped > 100_000 && samples - clamped > 100_000);
+    assert!(clamped > samples / 20 && samples - clamped > samples / 20);
+}
+
+/// `cargo test --release -p texmap --test exact -- --ignored --nocapture`
+#[test]
+#[ignore = "10^9 samples: minutes, and only in a release build"]
+fn every_texel_of_a_thousand_million_is_the_floor_of_the_quotient() {
+    let mut random = generator();
+    let (mut samples, mut clamped) = (0, 0);
+    while samples < 1_000_000_000 {
+        let more = compare(50_000_000, &mut random);
+        (samples, clamped) = (samples + more.0, clamped + more.1);
+        println!("{samples} samples, {clamped} of them clamped");
+    }
 }
 
 /// The forms are the real ones, cut by one shift, and off by no more than [`ROUNDING`]. So
