@@ -1,17 +1,21 @@
-//! Which pixels of a polygon lie in each screen column, and their texture coordinates.
+//! Which pixels of a polygon lie in each column, or in each row, of the screen.
 //!
 //! # The rule
 //!
 //! A pixel is inside when an odd number of edges have `ymin <= yc < ymax` and cross `yc` at
 //! `x <= xc`, where (xc, yc) is its centre: half-open and even-odd, decided in exact integers.
-//! That rule speaks of rows. It says: move the centre right by an infinitesimal e, and down by
-//! a d that is infinitesimal even beside e; then nothing is ever exactly on an edge, and the
-//! plain even-odd test decides. (Moving right turns `x <= xc` into `x < xc + e`; moving down
-//! turns the half-open interval into an open one; and since d is so small beside e, the slope
-//! of the edge does not disturb the first.)
+//! That rule speaks of rows, and [`rows`] takes it as it stands: the first pixel right of an
+//! edge is the first with `xc >= x(yc)`, and the pixels between an odd crossing and the next
+//! even one are inside.
 //!
-//! Said that way it can be asked down a column instead. The column at xc + e meets the edges
-//! with `xmin <= xc < xmax`, vertical ones never, and meets each at y(xc) + e dy/dx. A centre
+//! [`columns`] needs it in other words. It says: move the centre right by an infinitesimal e,
+//! and down by a d that is infinitesimal even beside e; then nothing is ever exactly on an edge,
+//! and the plain even-odd test decides. (Moving right turns `x <= xc` into `x < xc + e`; moving
+//! down turns the half-open interval into an open one; and since d is so small beside e, the
+//! slope of the edge does not disturb the first.)
+//!
+//! Said that way it can be asked down a column. The column at xc + e meets the edges with
+//! `xmin <= xc < xmax`, vertical ones never, and meets each at y(xc) + e dy/dx. A centre
 //! at yc + d lies below that crossing when yc > y(xc), and when yc = y(xc) only if dy/dx <= 0:
 //! for a rising edge (e times a positive slope) the crossing is further down than d. So the
 //! first row below an edge is
@@ -25,13 +29,16 @@
 //!
 //! # The arithmetic
 //!
-//! With xa < xb the first row below an edge is a floor of `N / (256 dx)`, N an integer that
-//! grows by `256 dy` from column to column: quotient and remainder are stepped, so there is no
-//! rounding to accumulate. |N| < 2^49 within [`MAX_COORDINATE`]. The crossing's exact height and
-//! the edge's texture coordinates are stepped in 32 fraction bits; over 320 columns they are off
-//! by less than 2^-23.
+//! Both scans walk *lines* (columns or rows), each a row of *cells* (its pixels), and differ in
+//! nothing but which coordinate is which, and the tie. Below, p counts across the lines and q
+//! along them: columns have (p, q) = (x, y), rows (y, x).
+//!
+//! With pa < pb the first cell past an edge is a floor of `N / (256 dp)`, N an integer that
+//! grows by `256 dq` from line to line: quotient and remainder are stepped, so there is no
+//! rounding to accumulate. |N| < 2^49 within [`MAX_COORDINATE`], in either scan.
 
-use crate::{ColumnJob, MAX_COORDINATE, MAX_SIDES, Texture, Vertex};
+use crate::along::Along;
+use crate::{MAX_COORDINATE, MAX_SIDES, Point};
 use modex::{HEIGHT, WIDTH};
 
 /// Why a polygon is not drawn.
@@ -43,114 +50,154 @@ pub enum Dropped {
     OutOfRange,
 }
 
-/// A quantity that is linear along an edge, at the centre of the current column.
-#[derive(Clone, Copy, Default)]
-struct Along {
-    /// 32 fraction bits.
-    value: i64,
-    step: i64,
+/// Inside pixels without a gap, in one line: a column from [`columns`], a row from [`rows`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Run {
+    /// The column's x, or the row's y.
+    pub line: u16,
+    /// The first pixel: its y in a column, its x in a row.
+    pub first: u16,
+    /// Pixels, at least 1; all of them are on the screen.
+    pub len: u16,
+    /// Where the line enters the polygon and where it leaves it. Either may be off the screen.
+    pub between: [Crossing; 2],
 }
 
-impl Along {
-    /// From `a` at x = 0 to `a + delta` at x = dx, at `x`; one column is 256 x. `shift` more
-    /// fraction bits make 32 of the input's. |a|, |delta|, dx and x are below 2^25.
-    fn new(a: i32, delta: i64, dx: i64, x: i64, shift: u32) -> Self {
-        Self {
-            value: (i64::from(a) << shift) + ratio(delta * x, dx, shift),
-            step: ratio(delta * 256, dx, shift),
-        }
-    }
-
-    fn advance(&mut self) {
-        self.value += self.step;
-    }
+/// Where a side of the polygon meets the middle of a line.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Crossing {
+    /// The side from vertex `side` to the next one.
+    pub side: usize,
+    /// y in a column, x in a row, in pixels with 32 fraction bits; off by less than 2^-23. It
+    /// decides no pixel: it is there to interpolate between the two ends of a run.
+    pub at: i64,
 }
 
-/// floor(n 2^shift / d) without the product: n < 2^50, d < 2^25, shift <= 24.
-fn ratio(n: i64, d: i64, shift: u32) -> i64 {
-    (n.div_euclid(d) << shift) + (n.rem_euclid(d) << shift) / d
+/// What makes a scan one by columns or by rows.
+struct Lines {
+    /// Lines on the screen, and pixels in each.
+    count: i32,
+    cells: i64,
+    /// (p, q) of a point.
+    place: fn(Point) -> (i32, i32),
+    /// Whether a centre on the crossing is past the edge, by the edge's dq where dp > 0.
+    tie: fn(i64) -> bool,
 }
 
-/// An edge that crosses at least one column of the screen.
+const COLUMNS: Lines = Lines {
+    count: WIDTH as i32,
+    cells: HEIGHT as i64,
+    place: |point| (point.x, point.y),
+    tie: |dy| dy <= 0,
+};
+
+const ROWS: Lines = Lines {
+    count: HEIGHT as i32,
+    cells: WIDTH as i64,
+    place: |point| (point.y, point.x),
+    tie: |_| true,
+};
+
+/// An edge that crosses at least one line of the screen.
 #[derive(Clone, Copy, Default)]
 struct Edge {
-    /// Columns `first..end`.
+    side: usize,
+    /// Lines `first..end`.
     first: i32,
     end: i32,
-    /// The first row below the edge in the current column, and what of N is left over.
-    row: i64,
+    /// The first cell past the edge in the current line, and what of N is left over.
+    cell: i64,
     left_over: i64,
-    row_step: i64,
+    cell_step: i64,
     left_over_step: i64,
     divisor: i64,
-    y: Along,
-    u: Along,
-    v: Along,
+    along: Along,
 }
 
 impl Edge {
-    /// The edge from `a` to `b` in either order, or nothing if no column of the screen meets it.
-    fn new(a: &Vertex, b: &Vertex) -> Option<Self> {
-        // Always from left to right: neighbours walk a shared edge with the same bits.
-        let (a, b) = if a.x <= b.x { (a, b) } else { (b, a) };
-        // Column c has its centre at 256 c + 128; these are the columns with xa <= xc < xb.
-        let first = ((a.x + 127) >> 8).max(0);
-        let end = ((b.x + 127) >> 8).min(WIDTH as i32);
-        if first >= end {
-            return None;
-        }
-        let dx = i64::from(b.x) - i64::from(a.x);
-        let dy = i64::from(b.y) - i64::from(a.y);
-        let x = i64::from(first) * 256 + 128 - i64::from(a.x);
-        let divisor = 256 * dx;
-        // A row's centre on the crossing is below it only if the edge does not fall.
-        let tie = if dy <= 0 { divisor - 1 } else { divisor };
-        let n = (i64::from(a.y) - 128) * dx + x * dy + tie;
+    /// The edge from `a` to `b` in either order, or nothing if no line of the screen meets it.
+    fn new(side: usize, a: (i32, i32), b: (i32, i32), lines: &Lines) -> Option<Self> {
+        // Always forward: neighbours walk a shared edge with the same bits.
+        let (a, b) = if a.0 <= b.0 { (a, b) } else { (b, a) };
+        let (first, end) = crossed(a.0, b.0, lines.count)?;
+        let dp = i64::from(b.0) - i64::from(a.0);
+        let dq = i64::from(b.1) - i64::from(a.1);
+        let p = offset(first, a.0);
+        let divisor = 256 * dp;
+        let tie = if (lines.tie)(dq) {
+            divisor - 1
+        } else {
+            divisor
+        };
+        let n = (i64::from(a.1) - 128) * dp + p * dq + tie;
         Some(Self {
+            side,
             first,
             end,
-            row: n.div_euclid(divisor),
+            cell: n.div_euclid(divisor),
             left_over: n.rem_euclid(divisor),
-            row_step: dy.div_euclid(dx),
-            left_over_step: 256 * dy.rem_euclid(dx),
+            cell_step: dq.div_euclid(dp),
+            left_over_step: 256 * dq.rem_euclid(dp),
             divisor,
-            y: Along::new(a.y, dy, dx, x, 24),
-            u: Along::new(a.u, i64::from(b.u - a.u), dx, x, 16),
-            v: Along::new(a.v, i64::from(b.v - a.v), dx, x, 16),
+            along: Along::new(a.1, dq, dp, first, p, 24),
         })
     }
 
     fn advance(&mut self) {
-        self.row += self.row_step;
+        self.cell += self.cell_step;
         self.left_over += self.left_over_step;
         if self.left_over >= self.divisor {
             self.left_over -= self.divisor;
-            self.row += 1;
+            self.cell += 1;
         }
-        self.y.advance();
-        self.u.advance();
-        self.v.advance();
     }
 }
 
-/// Gives `sink` a job for every run of inside pixels in every column of the screen, from left
-/// to right and in each column downward.
+/// The lines `first..end` of the screen's `count` that an edge from `a` to `b`, `a <= b`,
+/// crosses, if there are any: line l has its centre at 256 l + 128, and a <= centre < b.
+pub(crate) fn crossed(a: i32, b: i32, count: i32) -> Option<(i32, i32)> {
+    let first = ((a + 127) >> 8).max(0);
+    let end = ((b + 127) >> 8).min(count);
+    (first < end).then_some((first, end))
+}
+
+/// How far the centre of `line` is from `a`.
+pub(crate) fn offset(line: i32, a: i32) -> i64 {
+    i64::from(line) * 256 + 128 - i64::from(a)
+}
+
+/// Gives `sink` every run of inside pixels in every column of the screen, from left to right
+/// and in each column downward.
 ///
 /// # Errors
 /// A polygon outside the legal range; nothing of it was given to `sink`.
-pub fn columns(
-    polygon: &[Vertex],
-    texture: &Texture<'_>,
-    texture_index: u16,
-    mut sink: impl FnMut(ColumnJob),
+pub fn columns(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Result<(), Dropped> {
+    scan(polygon, &COLUMNS, sink)
+}
+
+/// Gives `sink` every run of inside pixels in every row of the screen, downward and in each row
+/// from left to right. The pixels are the same as those of [`columns`].
+///
+/// # Errors
+/// A polygon outside the legal range; nothing of it was given to `sink`.
+pub fn rows(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Result<(), Dropped> {
+    scan(polygon, &ROWS, sink)
+}
+
+#[inline]
+fn scan(
+    polygon: &[impl Copy + Into<Point>],
+    lines: &Lines,
+    mut sink: impl FnMut(Run),
 ) -> Result<(), Dropped> {
-    check(polygon, texture)?;
+    check(polygon)?;
     let mut edges = [Edge::default(); MAX_SIDES];
     let mut count = 0;
-    let (mut first, mut end) = (WIDTH as i32, 0);
-    for (i, a) in polygon.iter().enumerate() {
-        let b = &polygon[(i + 1) % polygon.len()];
-        if let Some(edge) = Edge::new(a, b) {
+    let (mut first, mut end) = (lines.count, 0);
+    for (side, &a) in polygon.iter().enumerate() {
+        let b = polygon[(side + 1) % polygon.len()];
+        let (a, b) = ((lines.place)(a.into()), (lines.place)(b.into()));
+        if let Some(edge) = Edge::new(side, a, b, lines) {
             first = first.min(edge.first);
             end = end.max(edge.end);
             edges[count] = edge;
@@ -158,97 +205,47 @@ pub fn columns(
         }
     }
     let edges = &mut edges[..count];
-    for column in first..end {
-        let mut crossings = [0usize; MAX_SIDES];
-        let mut crossed = 0;
-        for (i, edge) in edges.iter().enumerate() {
-            if edge.first <= column && column < edge.end {
-                crossings[crossed] = i;
-                crossed += 1;
+    for line in first..end {
+        let mut crossings = [(0, Crossing::default()); MAX_SIDES];
+        let mut count = 0;
+        for edge in edges.iter_mut() {
+            if edge.first <= line && line < edge.end {
+                let crossing = Crossing {
+                    side: edge.side,
+                    at: edge.along.at(line),
+                };
+                crossings[count] = (edge.cell, crossing);
+                count += 1;
+                edge.advance();
             }
         }
-        let crossings = &mut crossings[..crossed];
-        crossings.sort_unstable_by_key(|&i| (edges[i].row, edges[i].y.value));
+        let crossings = &mut crossings[..count];
+        crossings.sort_unstable_by_key(|&(cell, crossing)| (cell, crossing.at));
         for pair in crossings.chunks_exact(2) {
-            let (top, bottom) = (&edges[pair[0]], &edges[pair[1]]);
-            let rows = top.row.clamp(0, HEIGHT as i64)..bottom.row.clamp(0, HEIGHT as i64);
-            if !rows.is_empty() {
-                let mut job = run(top, bottom, rows, texture);
-                job.x = column as u16;
-                job.texture = texture_index;
-                sink(job);
+            let [first, end] = [pair[0].0, pair[1].0].map(|cell| cell.clamp(0, lines.cells));
+            if first < end {
+                sink(Run {
+                    line: line as u16,
+                    first: first as u16,
+                    len: (end - first) as u16,
+                    between: [pair[0].1, pair[1].1],
+                });
             }
-        }
-        for &i in crossings.iter() {
-            edges[i].advance();
         }
     }
     Ok(())
 }
 
-fn check(polygon: &[Vertex], texture: &Texture<'_>) -> Result<(), Dropped> {
+/// Whether the scan's arithmetic holds for `polygon`.
+pub(crate) fn check(polygon: &[impl Copy + Into<Point>]) -> Result<(), Dropped> {
     if polygon.len() > MAX_SIDES {
         return Err(Dropped::TooManySides);
     }
-    let screen = -MAX_COORDINATE..=MAX_COORDINATE;
-    let (width, height) = (texture.width(), texture.height());
-    let inside = polygon.iter().all(|vertex| {
-        screen.contains(&vertex.x)
-            && screen.contains(&vertex.y)
-            && (0..=i32::from(width) << 16).contains(&vertex.u)
-            && (0..=i32::from(height) << 16).contains(&vertex.v)
-    });
-    if inside {
+    let range = -MAX_COORDINATE..=MAX_COORDINATE;
+    let mut points = polygon.iter().map(|&vertex| vertex.into());
+    if points.all(|Point { x, y }| range.contains(&x) && range.contains(&y)) {
         Ok(())
     } else {
         Err(Dropped::OutOfRange)
-    }
-}
-
-/// The job for the rows between two edges in one column, its place across still open.
-///
-/// The coordinates at the first and the last pixel's centre are interpolated between the two
-/// crossings, then clamped into the texture; the step between them is cut towards zero.
-fn run(top: &Edge, bottom: &Edge, rows: core::ops::Range<i64>, texture: &Texture<'_>) -> ColumnJob {
-    let (last_u, last_v) = texture.last();
-    // 24 fraction bits of height keep 2^-8 texel even where a whole texture is squeezed into
-    // 1/256 pixel. A height below 2^9 pixels then has at most 33 bits and its product with a
-    // difference of coordinates (28 bits with 20 of fraction) fits; taller ones are scaled down.
-    let mut height = (bottom.y.value - top.y.value) >> 8;
-    let offset = |row: i64| (((row << 32) + (1 << 31)) - top.y.value) >> 8;
-    let (mut start, mut stop) = (offset(rows.start), offset(rows.end - 1));
-    let excess = (64 - height.max(1).leading_zeros()).saturating_sub(34);
-    for length in [&mut height, &mut start, &mut stop] {
-        *length >>= excess;
-    }
-    let at = |along: fn(&Edge) -> i64, offset: i64, last: i32| {
-        let (from, to) = (along(top) >> 12, along(bottom) >> 12);
-        let part = if height > 0 {
-            (to - from) * offset.clamp(0, height) / height
-        } else {
-            0
-        };
-        (((from + part) >> 4) as i32).clamp(0, last)
-    };
-    let (u, v) = (
-        at(|e| e.u.value, start, last_u),
-        at(|e| e.v.value, start, last_v),
-    );
-    let len = (rows.end - rows.start) as i32;
-    let (mut du, mut dv) = (0, 0);
-    // A column of one pixel has no step; dividing by len - 1 all the same was the seeds' trap.
-    if len > 1 {
-        du = (at(|e| e.u.value, stop, last_u) - u) / (len - 1);
-        dv = (at(|e| e.v.value, stop, last_v) - v) / (len - 1);
-    }
-    ColumnJob {
-        x: 0,
-        y: rows.start as u16,
-        len: len as u16,
-        texture: 0,
-        u,
-        v,
-        du,
-        dv,
     }
 }

@@ -10,9 +10,25 @@ pub const MAX_COORDINATE: i32 = 32_767 * SUBPIXELS;
 /// Most sides of a polygon.
 pub const MAX_SIDES: usize = 16;
 
-/// A corner of a polygon on the screen and in its texture.
-///
-/// Pixel (x, y) has its centre at (256 x + 128, 256 y + 128).
+/// A place on the screen. Pixel (x, y) has its centre at (256 x + 128, 256 y + 128).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Point {
+    /// Right, in 1/256 pixel, within +-[`MAX_COORDINATE`].
+    pub x: i32,
+    /// Down, in 1/256 pixel, within +-[`MAX_COORDINATE`].
+    pub y: i32,
+}
+
+impl From<Vertex> for Point {
+    fn from(vertex: Vertex) -> Self {
+        Self {
+            x: vertex.x,
+            y: vertex.y,
+        }
+    }
+}
+
+/// A corner of a polygon on the screen, placed as a [`Point`], and in its texture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Vertex {
     /// Right, in 1/256 pixel, within +-[`MAX_COORDINATE`].

@@ -2,7 +2,7 @@
 
 use modex::Destination;
 
-use crate::{JobList, Texture, Vertex, affine, coverage};
+use crate::{JobList, Texture, Vertex, affine};
 
 /// What was drawn, and what was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -55,7 +55,7 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
             destination,
             stats,
         } = self;
-        let scanned = coverage::columns(polygon, &textures[usize::from(texture)], texture, |job| {
+        let scanned = affine::columns(polygon, &textures[usize::from(texture)], texture, |job| {
             if let Err(job) = jobs.push(job) {
                 stats.full += 1;
                 draw(jobs, textures, *destination, stats);

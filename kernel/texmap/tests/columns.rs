@@ -1,29 +1,14 @@
-//! Columns against the definitions, pixel by pixel: coverage by the row rule as it is written,
-//! coordinates by the one affine map of a triangle.
+//! The affine mapper's jobs: coordinates against the one affine map of a triangle. Which pixels
+//! they cover is the oracle's to say (`tests/oracle`).
 
 use std::collections::HashMap;
 
-use texmap::{ColumnJob, MAX_COORDINATE, Texture, Vertex, coverage};
-
-/// The rule, word for word: inside when an odd number of edges have ymin <= yc < ymax and
-/// cross yc at x <= xc.
-fn inside(polygon: &[Vertex], x: i32, y: i32) -> bool {
-    let (xc, yc) = (i128::from(x) * 256 + 128, i128::from(y) * 256 + 128);
-    let mut odd = false;
-    for (i, a) in polygon.iter().enumerate() {
-        let b = &polygon[(i + 1) % polygon.len()];
-        let (a, b) = if a.y <= b.y { (a, b) } else { (b, a) };
-        let [ax, ay, bx, by] = [a.x, a.y, b.x, b.y].map(i128::from);
-        if ay <= yc && yc < by && ax * (by - ay) + (bx - ax) * (yc - ay) <= xc * (by - ay) {
-            odd = !odd;
-        }
-    }
-    odd
-}
+use texmap::coverage::{self, Dropped};
+use texmap::{ColumnJob, Texture, Vertex, affine};
 
 fn jobs(polygon: &[Vertex], texture: &Texture<'_>) -> Vec<ColumnJob> {
     let mut jobs = Vec::new();
-    coverage::columns(polygon, texture, 0, |job| jobs.push(job)).expect("legal polygon");
+    affine::columns(polygon, texture, 0, |job| jobs.push(job)).expect("legal polygon");
     jobs
 }
 
@@ -64,13 +49,13 @@ fn vertex(random: &mut fastrand::Rng, centre: (i32, i32), spread: i32, snap: i32
 }
 
 #[test]
-fn columns_cover_what_the_rule_says() {
+fn every_run_has_its_job_with_coordinates_inside_the_texture() {
     let seed = fastrand::u64(..);
     println!("seed {seed}");
     let mut random = fastrand::Rng::with_seed(seed);
     let texels = [0; 64 * 16];
     let texture = Texture::new(&texels, 64, 16).unwrap();
-    let mut covered = 0;
+    let mut pixels = 0;
     for case in 0..20_000 {
         // The middle of the screen, its corners, and spreads from a pixel to beyond the screen.
         let centre = [(160, 120), (0, 0), (319, 239), (319, 0)][case % 4];
@@ -81,47 +66,31 @@ fn columns_cover_what_the_rule_says() {
         let polygon: Vec<_> = (0..sides)
             .map(|_| vertex(&mut random, centre, spread, snap))
             .collect();
-        let drawn = drawn(&polygon, &texture);
-        let reach = spread / 256 + 2;
-        let (cx, cy) = (centre.0 / 256, centre.1 / 256);
-        for y in (cy - reach).max(0)..(cy + reach).min(240) {
-            for x in (cx - reach).max(0)..(cx + reach).min(320) {
-                let expected = inside(&polygon, x, y);
-                covered += u64::from(expected);
-                let actual = drawn.contains_key(&(x, y));
-                assert_eq!(actual, expected, "({x}, {y}) of {polygon:?}");
-            }
-        }
+        pixels += drawn(&polygon, &texture).len();
+        let placed = jobs(&polygon, &texture);
+        let mut placed = placed.iter().map(|job| (job.x, job.y, job.len));
+        coverage::columns(&polygon, |run| {
+            assert_eq!(placed.next(), Some((run.line, run.first, run.len)));
+        })
+        .unwrap();
+        assert_eq!(placed.next(), None);
     }
-    assert!(
-        covered > 100_000,
-        "only {covered} pixels were covered at all"
-    );
+    assert!(pixels > 100_000, "only {pixels} pixels were drawn at all");
 }
 
 #[test]
-fn the_far_corners_of_the_range_are_exact() {
-    let m = MAX_COORDINATE;
-    let corner = |x, y| Vertex { x, y, u: 0, v: 0 };
-    let texture = Texture::new(&[0], 1, 1).unwrap();
-    for polygon in [
-        [corner(-m, -m), corner(m, m), corner(-m, m)],
-        [corner(-m, m), corner(m, -m), corner(m, m)],
-        [corner(-m, -m + 1), corner(m, m), corner(m - 1, -m)],
-    ] {
-        let drawn = drawn(&polygon, &texture);
-        for (x, y) in (0..320).flat_map(|x| (0..240).map(move |y| (x, y))) {
-            let expected = inside(&polygon, x, y);
-            assert_eq!(
-                drawn.contains_key(&(x, y)),
-                expected,
-                "({x}, {y}) of {polygon:?}"
-            );
-        }
+fn a_coordinate_at_the_textures_border_is_drawn_and_one_beyond_is_not() {
+    let texture = Texture::new(&[0; 6], 3, 2).unwrap();
+    let (u, v) = (3 << 16, 2 << 16);
+    let triangle = |u, v| {
+        [(0, 0, 0, 0), (0, 512, u, 0), (512, 0, 0, v)].map(|(x, y, u, v)| Vertex { x, y, u, v })
+    };
+    assert!(!drawn(&triangle(u, v), &texture).is_empty());
+    for (u, v) in [(u + 1, v), (u, v + 1), (-1, v), (u, -1)] {
+        let sink = |job| panic!("{job:?} of a polygon out of range");
+        let scanned = affine::columns(&triangle(u, v), &texture, 0, sink);
+        assert_eq!(scanned, Err(Dropped::OutOfRange), "{u} {v}");
     }
-    let beyond = [corner(m + 1, 0), corner(0, 0), corner(0, 256)];
-    let mut sink = |job| panic!("{job:?} of a polygon out of range");
-    assert!(coverage::columns(&beyond, &texture, 0, &mut sink).is_err());
 }
 
 #[test]

@@ -1,0 +1,217 @@
+//! The renderer's scans against the oracle.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use texmap::coverage::{Dropped, Run, columns, rows};
+use texmap::{MAX_SIDES, Point};
+
+use crate::coverage::{Area, Pixels, Row};
+
+/// What a case of a sweep consists of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// Each is checked for itself.
+    pub polygons: Vec<Vec<Point>>,
+    /// If there is one, the polygons fill it: each pixel inside belongs to exactly one of them,
+    /// and none to any outside. It may have more sides than the renderer takes.
+    pub outline: Option<Vec<Point>>,
+}
+
+/// One of the renderer's scans.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scan {
+    /// [`texmap::coverage::columns`].
+    Columns,
+    /// [`texmap::coverage::rows`].
+    Rows,
+}
+
+/// What is wrong with a case.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// The polygon was dropped.
+    Dropped(Scan, Dropped),
+    /// The renderer panicked (an overflow, say).
+    Panicked,
+    /// A run that is empty, out of order, overlaps the one before, or has a pixel further out
+    /// than the ones around the polygon, or outside the screen.
+    Misplaced(Scan, Run),
+    /// The pixel is inside by the scan and not by the oracle, or the other way round.
+    Pixel {
+        /// The scan that differs.
+        scan: Scan,
+        /// The pixel's column.
+        x: i32,
+        /// The pixel's row.
+        y: i32,
+        /// What the oracle says.
+        inside: bool,
+    },
+    /// Two polygons of the case have the pixel.
+    Twice(i32, i32),
+    /// The pixel is in the outline and in no polygon, or in a polygon and not in the outline.
+    Gap(i32, i32),
+}
+
+impl fmt::Display for Wrong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = |scan: &Scan| match scan {
+            Scan::Columns => "the column scan",
+            Scan::Rows => "the row scan",
+        };
+        match self {
+            Self::Dropped(scan, why) => write!(f, "{} dropped it: {why:?}", name(scan)),
+            Self::Panicked => write!(f, "a scan panicked"),
+            Self::Misplaced(scan, run) => {
+                let Run {
+                    line, first, len, ..
+                } = run;
+                write!(
+                    f,
+                    "{} gave a run out of place: line {line}, {len} from {first}",
+                    name(scan)
+                )
+            }
+            Self::Pixel { scan, x, y, inside } => {
+                let is = if *inside { "inside" } else { "outside" };
+                write!(f, "({x}, {y}) is {is}, and not so by {}", name(scan))
+            }
+            Self::Twice(x, y) => write!(f, "({x}, {y}) belongs to two polygons"),
+            Self::Gap(x, y) => write!(f, "({x}, {y}) is not as in the outline"),
+        }
+    }
+}
+
+impl std::error::Error for Wrong {}
+
+/// Checks cases; it has the memory for that.
+#[derive(Debug, Default)]
+pub struct Checker {
+    oracle: Pixels,
+    scanned: Pixels,
+    union: Pixels,
+}
+
+impl Checker {
+    /// Checks a case, and says how many pixels were compared: for each polygon, all that meet
+    /// its bounding box on the screen and those around them.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn case(&mut self, case: &Case) -> Result<u64, Wrong> {
+        let Some(outline) = &case.outline else {
+            return case.polygons.iter().map(|p| self.polygon(p)).sum();
+        };
+        let whole = Area::around(outline);
+        self.union.clear(&whole);
+        let mut pixels = 0;
+        for polygon in &case.polygons {
+            pixels += self.polygon(polygon)?;
+            let area = Area::around(polygon);
+            for y in area.y.clone() {
+                let (union, row) = (self.union.row_mut(y), self.oracle.row(y));
+                let both = std::array::from_fn(|i| union[i] & row[i]);
+                if let Some(x) = first(&both) {
+                    return Err(Wrong::Twice(x, y));
+                }
+                for (all, word) in union.iter_mut().zip(row) {
+                    *all |= word;
+                }
+            }
+        }
+        self.oracle.cover(outline, &whole);
+        match difference(&self.oracle, &self.union, &whole) {
+            Some((x, y)) => Err(Wrong::Gap(x, y)),
+            None => Ok(pixels + whole.pixels()),
+        }
+    }
+
+    /// Checks a polygon, and says how many pixels were compared.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn polygon(&mut self, polygon: &[Point]) -> Result<u64, Wrong> {
+        debug_assert!(polygon.len() <= MAX_SIDES);
+        let area = Area::around(polygon);
+        self.oracle.cover(polygon, &area);
+        for scan in [Scan::Columns, Scan::Rows] {
+            // A panic is a failure like another, to be shrunk and printed.
+            catch_unwind(AssertUnwindSafe(|| self.scan(polygon, &area, scan)))
+                .unwrap_or(Err(Wrong::Panicked))?;
+            if let Some((x, y)) = difference(&self.oracle, &self.scanned, &area) {
+                let inside = self.oracle.contains(x, y);
+                return Err(Wrong::Pixel { scan, x, y, inside });
+            }
+        }
+        Ok(area.pixels())
+    }
+
+    /// Fills `scanned` by one of the renderer's scans.
+    fn scan(&mut self, polygon: &[Point], area: &Area, scan: Scan) -> Result<(), Wrong> {
+        let scanned = &mut self.scanned;
+        scanned.clear(area);
+        let (lines, cells) = match scan {
+            Scan::Columns => (&area.x, &area.y),
+            Scan::Rows => (&area.y, &area.x),
+        };
+        // Where the next run may begin, at the earliest.
+        let mut free = (lines.start, cells.start);
+        let mut wrong = None;
+        let sink = |run: Run| {
+            let (line, first) = (i32::from(run.line), i32::from(run.first));
+            let end = first + i32::from(run.len);
+            let placed = lines.contains(&line) && cells.start <= first && end <= cells.end;
+            if !placed || first == end || (line, first) < free {
+                wrong.get_or_insert(Wrong::Misplaced(scan, run));
+                return;
+            }
+            free = (line, end);
+            match scan {
+                Scan::Columns => {
+                    // Only the run's ends; what lies between is filled in below.
+                    let (word, bit) = (line as usize / 64, 1 << (line % 64));
+                    scanned.row_mut(first)[word] ^= bit;
+                    if end < cells.end {
+                        scanned.row_mut(end)[word] ^= bit;
+                    }
+                }
+                Scan::Rows => {
+                    scanned.toggle_from(first, line);
+                    scanned.toggle_from(end, line);
+                }
+            }
+        };
+        match scan {
+            Scan::Columns => columns(polygon, sink),
+            Scan::Rows => rows(polygon, sink),
+        }
+        .map_err(|why| Wrong::Dropped(scan, why))?;
+        if scan == Scan::Columns {
+            let mut above = Row::default();
+            for y in area.y.clone() {
+                let row = scanned.row_mut(y);
+                for (word, above) in row.iter_mut().zip(above) {
+                    *word ^= above;
+                }
+                above = *row;
+            }
+        }
+        wrong.map_or(Ok(()), Err)
+    }
+}
+
+/// The first pixel in which two sets differ, in the rows of `area`.
+fn difference(a: &Pixels, b: &Pixels, area: &Area) -> Option<(i32, i32)> {
+    area.y.clone().find_map(|y| {
+        let (a, b) = (a.row(y), b.row(y));
+        let x = first(&std::array::from_fn(|i| a[i] ^ b[i]))?;
+        Some((x, y))
+    })
+}
+
+/// The leftmost pixel of a row.
+fn first(row: &Row) -> Option<i32> {
+    let i = row.iter().position(|&word| word != 0)?;
+    Some(i as i32 * 64 + row[i].trailing_zeros() as i32)
+}

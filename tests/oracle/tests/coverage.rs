@@ -1,0 +1,103 @@
+//! The renderer's scans against the oracle: a few seconds of what `cargo sweep` does for as long
+//! as it is told to. What a sweep finds is pasted in here.
+
+use std::fmt::Display;
+
+use oracle::check::{Case, Checker};
+use oracle::mix::Mix;
+use oracle::shrink::{shrink, source};
+use oracle::small_world::{STEPS, TRIANGLES, triangle};
+use texmap::coverage::{self, Dropped};
+use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
+
+/// Cases of each mix: ten seconds of them.
+const CASES: u64 = 100_000;
+
+fn polygon(points: &[(i32, i32)]) -> Vec<Point> {
+    points.iter().map(|&(x, y)| Point { x, y }).collect()
+}
+
+/// Pixels compared; panics with a test to paste.
+fn check(checker: &mut Checker, case: &Case, from: impl Display) -> u64 {
+    checker.case(case).unwrap_or_else(|_| {
+        let small = shrink(checker, case);
+        let wrong = checker.case(&small).expect_err("shrinking keeps a failure");
+        panic!("\n{}", source(&small, &wrong, from));
+    })
+}
+
+#[test]
+fn columns_and_rows_cover_what_the_oracle_says_in_every_mix() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    let mut checker = Checker::default();
+    for mix in Mix::ALL {
+        let mut pixels = 0;
+        for number in 0..CASES {
+            let from = format_args!("mix {mix:?}, seed {seed}, case {number}");
+            pixels += check(&mut checker, &mix.case(seed, number), from);
+        }
+        println!("{}: {CASES} cases, {pixels} pixels", mix.name());
+    }
+}
+
+#[test]
+fn a_part_of_the_small_world_is_covered_as_the_oracle_says() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut checker = Checker::default();
+    for step in STEPS {
+        for _ in 0..TRIANGLES / 50 {
+            let number = random.u32(..TRIANGLES);
+            let case = Case {
+                polygons: vec![triangle(step, number).to_vec()],
+                outline: None,
+            };
+            check(
+                &mut checker,
+                &case,
+                format_args!("the small world: step {step}, case {number}"),
+            );
+        }
+    }
+}
+
+#[test]
+fn the_far_corners_of_the_range_are_covered_as_the_oracle_says() {
+    let m = MAX_COORDINATE;
+    let mut checker = Checker::default();
+    for points in [
+        [(-m, -m), (m, m), (-m, m)],
+        [(-m, m), (m, -m), (m, m)],
+        [(-m, -m + 1), (m, m), (m - 1, -m)],
+        [(-m, 128), (m, 128), (m, 129)],
+        [(128, -m), (128, m), (129, m)],
+    ] {
+        let case = Case {
+            polygons: vec![polygon(&points)],
+            outline: None,
+        };
+        assert!(check(&mut checker, &case, "hand") >= 2 * 240);
+    }
+}
+
+#[test]
+fn beyond_the_range_a_polygon_is_dropped_and_gives_no_run() {
+    let m = MAX_COORDINATE;
+    let shifted = |x: i32, y: i32| polygon(&[(m + x, m + y), (0, 0), (-m - x, 256 - y)]);
+    let with_sides = |n: usize| polygon(&[(0, 0), (0, 256), (256, 0)].repeat(6)[..n]);
+    let mut checker = Checker::default();
+    for polygon in [shifted(0, 0), with_sides(MAX_SIDES)] {
+        assert!(checker.polygon(&polygon).is_ok());
+    }
+    let panics = |run| panic!("{run:?} of a polygon out of range");
+    for (polygon, why) in [
+        (shifted(1, 0), Dropped::OutOfRange),
+        (shifted(0, 1), Dropped::OutOfRange),
+        (with_sides(MAX_SIDES + 1), Dropped::TooManySides),
+    ] {
+        assert_eq!(coverage::columns(&polygon, panics), Err(why));
+        assert_eq!(coverage::rows(&polygon, panics), Err(why));
+    }
+}

@@ -1,0 +1,88 @@
+//! That the mixes are what their names say; what they are good for is seen when a scan is wrong.
+
+use oracle::mix::Mix;
+use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
+
+fn area(a: Point, b: Point, c: Point) -> i64 {
+    let d = |a: i32, b: i32| i64::from(b) - i64::from(a);
+    d(a.x, b.x) * d(a.y, c.y) - d(a.x, c.x) * d(a.y, b.y)
+}
+
+/// Twice the area, cut into triangles from the first vertex.
+fn signed_area(p: &[Point]) -> i64 {
+    p.windows(2).map(|side| area(p[0], side[0], side[1])).sum()
+}
+
+fn extent(coordinates: impl Iterator<Item = i32> + Clone) -> i32 {
+    coordinates.clone().max().unwrap() - coordinates.min().unwrap()
+}
+
+fn is_on_screen(p: &Point) -> bool {
+    (0..320 * 256).contains(&p.x) && (0..240 * 256).contains(&p.y)
+}
+
+fn keeps_its_promise(mix: Mix, p: &[Point]) -> bool {
+    let n = p.len();
+    let corner = |i: usize| [p[i], p[(i + 1) % n], p[(i + 2) % n]];
+    let turns = (0..n).map(|i| {
+        let [a, b, c] = corner(i);
+        area(a, b, c)
+    });
+    match mix {
+        Mix::Centres => p.iter().all(|p| p.x & 255 == 128 && p.y & 255 == 128),
+        Mix::Borders => p.iter().all(|p| p.x & 255 == 0 || p.y & 255 == 0),
+        Mix::Straight => p.windows(2).all(|side| {
+            let (dx, dy) = (side[1].x - side[0].x, side[1].y - side[0].y);
+            dx == 0 || dy == 0 || dx.abs() == dy.abs()
+        }),
+        // All within 2/256 of the line through the two that are furthest apart.
+        Mix::Slivers => {
+            let length = |a: Point, b: Point| i64::from((b.x - a.x).abs().max((b.y - a.y).abs()));
+            let pairs = p.iter().flat_map(|&a| p.iter().map(move |&b| (a, b)));
+            let (a, b) = pairs.max_by_key(|&(a, b)| length(a, b)).unwrap();
+            p.iter().all(|&c| area(a, b, c).abs() <= 4 * length(a, b))
+        }
+        Mix::Flat => p.iter().all(|&c| p.iter().all(|&b| area(p[0], b, c) == 0)),
+        Mix::Repeated => p.iter().enumerate().any(|(i, a)| p[..i].contains(a)),
+        Mix::Collinear => turns.clone().any(|turn| turn == 0),
+        Mix::Crossing => turns.clone().any(|turn| turn > 0) && turns.clone().any(|turn| turn < 0),
+        Mix::Clockwise => signed_area(p) > 0,
+        Mix::Anticlockwise => signed_area(p) < 0,
+        Mix::Outside => p.iter().any(is_on_screen) && !p.iter().all(is_on_screen),
+        Mix::Far => p.iter().any(|p| p.x.abs().max(p.y.abs()) > 10_000 * 256),
+        Mix::Tiny => extent(p.iter().map(|p| p.x)).max(extent(p.iter().map(|p| p.y))) < 256,
+        Mix::Fans => n == 3,
+        Mix::Meshes => n <= 4,
+    }
+}
+
+#[test]
+fn every_mix_is_what_its_name_says_and_legal() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    for mix in Mix::ALL {
+        let mut sides = [false; MAX_SIDES];
+        for number in 0..5000 {
+            let case = mix.case(seed, number);
+            for polygon in &case.polygons {
+                sides[polygon.len()] = true;
+                let legal = |p: &Point| p.x.abs().max(p.y.abs()) <= MAX_COORDINATE;
+                let good = polygon.iter().all(legal) && keeps_its_promise(mix, polygon);
+                assert!(good, "{mix:?} {number}: {polygon:?}");
+            }
+            let many = matches!(mix, Mix::Fans | Mix::Meshes);
+            assert_eq!(case.outline.is_some(), many, "{mix:?} {number}");
+            if let Some(outline) = &case.outline {
+                // The areas add up: the polygons fill the outline, and none is turned over.
+                let sum: i64 = case.polygons.iter().map(|p| signed_area(p).abs()).sum();
+                assert_eq!(sum, signed_area(outline).abs(), "{mix:?} {number}");
+            }
+        }
+        match mix {
+            Mix::Fans | Mix::Meshes => {}
+            // A triangle is convex, and one with a vertex in a side has four.
+            Mix::Crossing | Mix::Collinear => assert!(sides[4..=8].iter().all(|&seen| seen)),
+            _ => assert!(sides[3..=8].iter().all(|&seen| seen), "{mix:?}"),
+        }
+    }
+}
