@@ -12,7 +12,7 @@ use std::path::Path;
 
 use crystal_ball::indexed::Indexed;
 use modex::{Column, Destination, HEIGHT, PlanarBuffer, WIDTH};
-use texmap::{JobList, Renderer, Texture, Vertex};
+use texmap::{JobList, Mapping, Renderer, Texture, Vertex};
 
 /// Fields of the sheet across and down.
 const FIELDS: (i32, i32) = (9, 7);
@@ -146,7 +146,7 @@ fn exact() -> Page {
         let mut jobs = JobList::<64>::new();
         let mut noted = Noted(&mut page, kind, PlanarBuffer::new());
         let mut renderer = Renderer::new(&mut jobs, &textures, &mut noted);
-        renderer.polygon(&polygon, 0);
+        renderer.polygon(&polygon, 0, Mapping::Affine);
         renderer.finish();
     }
     page

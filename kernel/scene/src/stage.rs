@@ -1,7 +1,7 @@
 //! A scene made ready, and the way from a pose to polygons.
 
 use modex::{Destination, HEIGHT, Palette};
-use texmap::{JobList, MAX_SIDES, Renderer, Stats, Texture, Vertex};
+use texmap::{JobList, MAX_SIDES, Mapping, Renderer, Stats, Texture, Vertex};
 
 use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
 use crate::{Face, Mesh, Pose, project};
@@ -156,7 +156,7 @@ impl<'a> Stage<'a> {
             } else if looks_at_viewer(polygon) {
                 let level = lit_level(orientation.turn(face.normal));
                 let surface = usize::from(face.texture) * LIGHT_LEVELS + level;
-                renderer.polygon(polygon, surface as u16);
+                renderer.polygon(polygon, surface as u16, Mapping::Affine);
             }
         }
         renderer.finish()

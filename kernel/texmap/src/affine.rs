@@ -1,20 +1,21 @@
 //! The affine column mapper: texture coordinates stepped down the column in 16.16.
 //!
-//! [`columns`] makes the jobs of a polygon: the coordinates are interpolated along its sides to
-//! the column's centre, then along the column. [`column`] draws one.
+//! [`Sides`] has the coordinates along a polygon's sides, and makes the walk down a run: exactly
+//! between the two crossings, or by chapter 57's half steps. [`column`] draws one.
 //!
-//! Legal input of the mapper: a job as [`columns`] makes it (its ends inside the texture). Error
-//! against the exact affine coordinates: the step is cut to 2^-16 texel towards zero, so after n
-//! pixels the coordinate is off by less than n 2^-16 texel, at most 0.0037 over 240.
+//! Legal input of the mapper: a walk as [`Sides`] makes it (inside the texture). Error against the
+//! exact affine coordinates: the step is cut to 2^-16 texel towards zero, so after n pixels the
+//! coordinate is off by less than n 2^-16 texel, at most 0.0037 over 240. The half steps are
+//! another rule: see [`Sides::half_step`].
 
 use modex::{Column, WIDTH};
 
 use crate::along::Along;
 use crate::coverage::{self, Dropped, Run};
-use crate::{ColumnJob, MAX_SIDES, Texture, Vertex};
+use crate::{MAX_SIDES, Texture, Vertex};
 
 /// The texture coordinates along a side of the polygon.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug, Default)]
 struct Side {
     u: Along,
     v: Along,
@@ -38,96 +39,150 @@ impl Side {
     }
 }
 
-/// Gives `sink` a job for every run of inside pixels in every column of the screen, from left
-/// to right and in each column downward.
+/// A walk through the texture, 16.16.
 ///
-/// # Errors
-/// A polygon outside the legal range; nothing of it was given to `sink`.
-pub fn columns(
-    polygon: &[Vertex],
-    texture: &Texture<'_>,
-    texture_index: u16,
-    mut sink: impl FnMut(ColumnJob),
-) -> Result<(), Dropped> {
-    coverage::check(polygon)?;
-    let (width, height) = (texture.width(), texture.height());
-    let inside = |vertex: &Vertex| {
-        (0..=i32::from(width) << 16).contains(&vertex.u)
-            && (0..=i32::from(height) << 16).contains(&vertex.v)
-    };
-    if !polygon.iter().all(inside) {
-        return Err(Dropped::OutOfRange);
-    }
-    let mut sides = [Side::default(); MAX_SIDES];
-    for (i, a) in polygon.iter().enumerate() {
-        sides[i] = Side::new(a, &polygon[(i + 1) % polygon.len()]);
-    }
-    coverage::columns(polygon, |run| {
-        let mut job = job(&run, &sides, texture);
-        job.texture = texture_index;
-        sink(job);
-    })
+/// For every row i of its column, `u + i du` and `v + i dv` lie inside the texture: the two end
+/// values were clamped into it and the steps are cut towards zero, so nothing between can leave
+/// it. The mapper does not clamp.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Walk {
+    /// Across the texture, at the first pixel's centre.
+    pub u: i32,
+    /// Down the texture, at the first pixel's centre.
+    pub v: i32,
+    /// Step of `u` from a pixel to the one below.
+    pub du: i32,
+    /// Step of `v` from a pixel to the one below.
+    pub dv: i32,
 }
 
-/// The job for a run, its texture still open.
-///
-/// The coordinates at the first and the last pixel's centre are interpolated between the two
-/// crossings, then clamped into the texture; the step between them is cut towards zero.
-fn job(run: &Run, sides: &[Side; MAX_SIDES], texture: &Texture<'_>) -> ColumnJob {
-    let (last_u, last_v) = texture.last();
-    let [top, bottom] = run.between;
-    // 24 fraction bits of height keep 2^-8 texel even where a whole texture is squeezed into
-    // 1/256 pixel. A height below 2^9 pixels then has at most 33 bits and its product with a
-    // difference of coordinates (28 bits with 20 of fraction) fits; taller ones are scaled down.
-    let mut height = (bottom.at - top.at) >> 8;
-    let offset = |row: i64| (((row << 32) + (1 << 31)) - top.at) >> 8;
-    let (first, len) = (i64::from(run.first), i64::from(run.len));
-    let (mut start, mut stop) = (offset(first), offset(first + len - 1));
-    let excess = (64 - height.max(1).leading_zeros()).saturating_sub(34);
-    for length in [&mut height, &mut start, &mut stop] {
-        *length >>= excess;
-    }
-    let at = |along: fn(&Side) -> &Along, offset: i64, last: i32| {
-        let [from, to] =
-            [top, bottom].map(|end| along(&sides[end.side]).at(i32::from(run.line)) >> 12);
-        let part = if height > 0 {
-            (to - from) * offset.clamp(0, height) / height
-        } else {
-            0
+/// The texture coordinates along all sides of a polygon.
+#[derive(Debug)]
+pub struct Sides {
+    sides: [Side; MAX_SIDES],
+    /// The last coordinate inside the texture, across and down.
+    last: (i32, i32),
+}
+
+impl Sides {
+    /// Those of `polygon` in `texture`.
+    ///
+    /// # Errors
+    /// A polygon outside the legal range, or coordinates outside the texture.
+    pub fn new(polygon: &[Vertex], texture: &Texture<'_>) -> Result<Self, Dropped> {
+        coverage::check(polygon)?;
+        let (width, height) = (texture.width(), texture.height());
+        let inside = |vertex: &Vertex| {
+            (0..=i32::from(width) << 16).contains(&vertex.u)
+                && (0..=i32::from(height) << 16).contains(&vertex.v)
         };
-        (((from + part) >> 4) as i32).clamp(0, last)
-    };
-    let (u, v) = (at(|s| &s.u, start, last_u), at(|s| &s.v, start, last_v));
-    let (mut du, mut dv) = (0, 0);
-    // A column of one pixel has no step; dividing by len - 1 all the same was the seeds' trap.
-    if run.len > 1 {
-        let steps = i32::from(run.len) - 1;
-        du = (at(|s| &s.u, stop, last_u) - u) / steps;
-        dv = (at(|s| &s.v, stop, last_v) - v) / steps;
+        if !polygon.iter().all(inside) {
+            return Err(Dropped::OutOfRange);
+        }
+        let mut sides = [Side::default(); MAX_SIDES];
+        for (i, a) in polygon.iter().enumerate() {
+            sides[i] = Side::new(a, &polygon[(i + 1) % polygon.len()]);
+        }
+        Ok(Self {
+            sides,
+            last: texture.last(),
+        })
     }
-    ColumnJob {
-        x: run.line,
-        y: run.first,
-        len: run.len,
-        texture: 0,
-        u,
-        v,
-        du,
-        dv,
+
+    /// The walk down a run of [`coverage::columns`].
+    ///
+    /// The coordinates at the first and the last pixel's centre are interpolated between the two
+    /// crossings, then clamped into the texture; the step between them is cut towards zero.
+    pub fn walk(&self, run: &Run) -> Walk {
+        let [top, bottom] = run.between;
+        // 24 fraction bits of height keep 2^-8 texel even where a whole texture is squeezed into
+        // 1/256 pixel. A height below 2^9 pixels then has at most 33 bits and its product with a
+        // difference of coordinates (28 bits with 20 of fraction) fits; taller ones are scaled
+        // down.
+        let mut height = (bottom.at - top.at) >> 8;
+        let offset = |row: i64| (((row << 32) + (1 << 31)) - top.at) >> 8;
+        let (first, len) = (i64::from(run.first), i64::from(run.len));
+        let (mut start, mut stop) = (offset(first), offset(first + len - 1));
+        let excess = (64 - height.max(1).leading_zeros()).saturating_sub(34);
+        for length in [&mut height, &mut start, &mut stop] {
+            *length >>= excess;
+        }
+        let at = |along: fn(&Side) -> &Along, offset: i64, last: i32| {
+            let [from, to] = self.ends(run, along).map(|end| end >> 12);
+            let part = if height > 0 {
+                (to - from) * offset.clamp(0, height) / height
+            } else {
+                0
+            };
+            (((from + part) >> 4) as i32).clamp(0, last)
+        };
+        let (u, v) = (
+            at(|s| &s.u, start, self.last.0),
+            at(|s| &s.v, start, self.last.1),
+        );
+        let (mut du, mut dv) = (0, 0);
+        // A column of one pixel has no step; dividing by len - 1 all the same was the seeds' trap.
+        if run.len > 1 {
+            let steps = i32::from(run.len) - 1;
+            du = (at(|s| &s.u, stop, self.last.0) - u) / steps;
+            dv = (at(|s| &s.v, stop, self.last.1) - v) / steps;
+        }
+        Walk { u, v, du, dv }
+    }
+
+    /// The walk by chapter 57's rule, translated to texels that begin at whole numbers.
+    ///
+    /// It knows pixels, not where in them the crossings lie: the coordinates of the two crossings
+    /// are shared out over the n pixels between them in n equal steps, and the first pixel stands
+    /// half a step in. Where n is small that is off by most of a pixel's worth of texture.
+    pub fn half_step(&self, run: &Run) -> Walk {
+        // The first pixel whose centre is not above a crossing, on the screen or off it.
+        let cell = |at: i64| (at + (1 << 31) - 1) >> 32;
+        let [top, bottom] = run.between.map(|end| cell(end.at));
+        // Crossings are off by 2^-23: they may be told on the wrong side of a centre.
+        let before = (i64::from(run.first) - top).max(0);
+        let steps = (bottom - top).max(before + i64::from(run.len));
+        let [u, v] = [
+            self.ends(run, |s| &s.u).map(|u| (u, self.last.0)),
+            self.ends(run, |s| &s.v).map(|v| (v, self.last.1)),
+        ]
+        .map(|[(from, last), (to, _)]| {
+            let [from, to] = [from, to].map(|end| (end >> 16).clamp(0, i64::from(last) + 1));
+            let step = (to - from) / steps;
+            let first = from + step / 2 + before * step;
+            (first.min(i64::from(last)) as i32, step as i32)
+        });
+        Walk {
+            u: u.0,
+            v: v.0,
+            du: u.1,
+            dv: v.1,
+        }
+    }
+
+    /// A coordinate where the run's column enters the polygon and where it leaves it.
+    fn ends(&self, run: &Run, along: fn(&Side) -> &Along) -> [i64; 2] {
+        let line = i32::from(run.line);
+        run.between.map(|end| along(&self.sides[end.side]).at(line))
     }
 }
 
-/// Draws one column of `job` from `texture`.
+/// Draws one column.
 #[inline]
-pub fn column(texture: &Texture<'_>, job: &ColumnJob, column: Column<'_>) {
+pub fn column(texture: &Texture<'_>, walk: &Walk, column: Column<'_>) {
     let texels = texture.texels();
     let width = usize::from(texture.width());
-    let (mut u, mut v) = (job.u, job.v);
+    let Walk {
+        mut u,
+        mut v,
+        du,
+        dv,
+    } = *walk;
     column.fill(|| {
         let texel = texels[(v >> 16) as usize * width + (u >> 16) as usize];
         // The last addition steps past the column; |u| and |du| are below 2^25, so it fits.
-        u += job.du;
-        v += job.dv;
+        u += du;
+        v += dv;
         texel
     });
 }

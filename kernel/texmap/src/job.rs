@@ -1,11 +1,18 @@
 //! Column jobs and the bounded list that holds them.
 
+use crate::{affine, exact};
+
+/// How a column's texture is walked: starts and steps, one mapper's or another's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Walk {
+    /// [`affine`].
+    Affine(affine::Walk),
+    /// [`exact`].
+    Exact(exact::Walk),
+}
+
 /// One column to draw: where, and what the mapper needs to walk its texture.
-///
-/// For every row i below `len`, `u + i du` and `v + i dv` lie inside the texture: the two end
-/// values were clamped into it and the steps are cut towards zero, so nothing between can leave
-/// it. No mapper clamps.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColumnJob {
     /// Screen column, 0 to 319.
     pub x: u16,
@@ -15,14 +22,8 @@ pub struct ColumnJob {
     pub len: u16,
     /// Which of the scene's textures.
     pub texture: u16,
-    /// Texture coordinate across at the first pixel's centre, 16.16.
-    pub u: i32,
-    /// Texture coordinate down at the first pixel's centre, 16.16.
-    pub v: i32,
-    /// Step of `u` from a pixel to the one below, 16.16.
-    pub du: i32,
-    /// Step of `v` from a pixel to the one below, 16.16.
-    pub dv: i32,
+    /// Its walk.
+    pub walk: Walk,
 }
 
 /// A list of at most `N` jobs, without a heap.
@@ -38,10 +39,12 @@ impl<const N: usize> JobList<N> {
         y: 0,
         len: 0,
         texture: 0,
-        u: 0,
-        v: 0,
-        du: 0,
-        dv: 0,
+        walk: Walk::Affine(affine::Walk {
+            u: 0,
+            v: 0,
+            du: 0,
+            dv: 0,
+        }),
     };
 
     /// An empty list.

@@ -2,7 +2,9 @@
 
 use modex::Destination;
 
-use crate::{JobList, Texture, Vertex, affine};
+use crate::affine::Sides;
+use crate::coverage::{Run, columns};
+use crate::{ColumnJob, JobList, Plane, Texture, Vertex, Walk, affine, exact};
 
 /// What was drawn, and what was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -17,6 +19,17 @@ pub struct Stats {
     pub dropped: u32,
     /// Times that the job list was full and had to be drawn before the picture was complete.
     pub full: u32,
+}
+
+/// How a polygon's texture coordinates are found.
+#[derive(Clone, Copy, Debug)]
+pub enum Mapping<'a> {
+    /// Affine, from the vertices' own: [`Sides::walk`].
+    Affine,
+    /// Affine by chapter 57's half steps: [`Sides::half_step`].
+    HalfStep,
+    /// With the perspective of the texture's plane: [`exact`].
+    Exact(&'a Plane),
 }
 
 /// Draws polygons on a destination through a bounded list of jobs.
@@ -48,21 +61,40 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
     ///
     /// # Panics
     /// If there is no such texture.
-    pub fn polygon(&mut self, polygon: &[Vertex], texture: u16) {
+    pub fn polygon(&mut self, polygon: &[Vertex], texture: u16, mapping: Mapping<'_>) {
         let Self {
             jobs,
             textures,
             destination,
             stats,
         } = self;
-        let scanned = affine::columns(polygon, &textures[usize::from(texture)], texture, |job| {
+        let mut add = |run: Run, walk| {
+            let job = ColumnJob {
+                x: run.line,
+                y: run.first,
+                len: run.len,
+                texture,
+                walk,
+            };
             if let Err(job) = jobs.push(job) {
                 stats.full += 1;
                 draw(jobs, textures, *destination, stats);
                 // A list that was just emptied takes the job: N is not zero.
                 let _ = jobs.push(job);
             }
-        });
+        };
+        let sides = || Sides::new(polygon, &textures[usize::from(texture)]);
+        let scanned = match mapping {
+            Mapping::Affine => sides()
+                .and_then(|sides| columns(polygon, |run| add(run, Walk::Affine(sides.walk(&run))))),
+            Mapping::HalfStep => sides().and_then(|sides| {
+                columns(polygon, |run| add(run, Walk::Affine(sides.half_step(&run))))
+            }),
+            Mapping::Exact(plane) => columns(polygon, |run| {
+                let walk = exact::Walk::new(plane, run.line, run.first);
+                add(run, Walk::Exact(walk));
+            }),
+        };
         match scanned {
             Ok(()) => stats.polygons += 1,
             Err(_) => stats.dropped += 1,
@@ -93,8 +125,9 @@ fn draw<D: Destination, const N: usize>(
         stats.columns += 1;
         stats.pixels += u32::from(job.len);
         let texture = &textures[usize::from(job.texture)];
-        destination.column(job.x, job.y, job.len, |column| {
-            affine::column(texture, job, column);
+        destination.column(job.x, job.y, job.len, |column| match &job.walk {
+            Walk::Affine(walk) => affine::column(texture, walk, column),
+            Walk::Exact(walk) => exact::column(texture, *walk, job.len, column),
         });
     }
     jobs.clear();

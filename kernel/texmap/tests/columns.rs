@@ -1,35 +1,34 @@
-//! The affine mapper's jobs: coordinates against the one affine map of a triangle. Which pixels
+//! The affine mapper's walks: coordinates against the one affine map of a triangle. Which pixels
 //! they cover is the oracle's to say (`tests/oracle`).
 
 use std::collections::HashMap;
 
-use texmap::coverage::{self, Dropped};
-use texmap::{ColumnJob, Texture, Vertex, affine};
+use texmap::affine::{Sides, Walk};
+use texmap::coverage::{self, Dropped, Run};
+use texmap::{Texture, Vertex};
 
-fn jobs(polygon: &[Vertex], texture: &Texture<'_>) -> Vec<ColumnJob> {
-    let mut jobs = Vec::new();
-    affine::columns(polygon, texture, 0, |job| jobs.push(job)).expect("legal polygon");
-    jobs
+/// How the walk down a run is made.
+type Rule = fn(&Sides, &Run) -> Walk;
+
+fn walks(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Run, Walk)> {
+    let sides = Sides::new(polygon, texture).expect("legal polygon");
+    let mut walks = Vec::new();
+    coverage::columns(polygon, |run| walks.push((run, rule(&sides, &run)))).unwrap();
+    walks
 }
 
-/// Pixels of `polygon`, each with its coordinates; panics on a pixel drawn twice, outside the
-/// screen, or outside the texture.
-fn drawn(polygon: &[Vertex], texture: &Texture<'_>) -> HashMap<(i32, i32), (i32, i32)> {
+/// Pixels of `polygon`, each with its coordinates; panics on one outside the texture.
+fn drawn(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> HashMap<(i32, i32), (i32, i32)> {
     let (last_u, last_v) = texture.last();
     let mut pixels = HashMap::new();
-    for job in jobs(polygon, texture) {
-        assert!(
-            job.x < 320 && job.len >= 1 && job.y + job.len <= 240,
-            "{job:?}"
-        );
-        for i in 0..i32::from(job.len) {
-            let (u, v) = (job.u + i * job.du, job.v + i * job.dv);
+    for (run, walk) in walks(polygon, texture, rule) {
+        for i in 0..i32::from(run.len) {
+            let (u, v) = (walk.u + i * walk.du, walk.v + i * walk.dv);
             assert!(
                 (0..=last_u).contains(&u) && (0..=last_v).contains(&v),
-                "{job:?} row {i}"
+                "{run:?} {walk:?} row {i} of {polygon:?}"
             );
-            let at = (i32::from(job.x), i32::from(job.y) + i);
-            assert_eq!(pixels.insert(at, (u, v)), None, "{at:?} drawn twice");
+            pixels.insert((i32::from(run.line), i32::from(run.first) + i), (u, v));
         }
     }
     pixels
@@ -49,7 +48,7 @@ fn vertex(random: &mut fastrand::Rng, centre: (i32, i32), spread: i32, snap: i32
 }
 
 #[test]
-fn every_run_has_its_job_with_coordinates_inside_the_texture() {
+fn every_walk_stays_inside_the_texture() {
     let seed = fastrand::u64(..);
     println!("seed {seed}");
     let mut random = fastrand::Rng::with_seed(seed);
@@ -66,14 +65,9 @@ fn every_run_has_its_job_with_coordinates_inside_the_texture() {
         let polygon: Vec<_> = (0..sides)
             .map(|_| vertex(&mut random, centre, spread, snap))
             .collect();
-        pixels += drawn(&polygon, &texture).len();
-        let placed = jobs(&polygon, &texture);
-        let mut placed = placed.iter().map(|job| (job.x, job.y, job.len));
-        coverage::columns(&polygon, |run| {
-            assert_eq!(placed.next(), Some((run.line, run.first, run.len)));
-        })
-        .unwrap();
-        assert_eq!(placed.next(), None);
+        let exact = drawn(&polygon, &texture, Sides::walk).len();
+        assert_eq!(drawn(&polygon, &texture, Sides::half_step).len(), exact);
+        pixels += exact;
     }
     assert!(pixels > 100_000, "only {pixels} pixels were drawn at all");
 }
@@ -85,11 +79,10 @@ fn a_coordinate_at_the_textures_border_is_drawn_and_one_beyond_is_not() {
     let triangle = |u, v| {
         [(0, 0, 0, 0), (0, 512, u, 0), (512, 0, 0, v)].map(|(x, y, u, v)| Vertex { x, y, u, v })
     };
-    assert!(!drawn(&triangle(u, v), &texture).is_empty());
+    assert!(!drawn(&triangle(u, v), &texture, Sides::walk).is_empty());
     for (u, v) in [(u + 1, v), (u, v + 1), (-1, v), (u, -1)] {
-        let sink = |job| panic!("{job:?} of a polygon out of range");
-        let scanned = affine::columns(&triangle(u, v), &texture, 0, sink);
-        assert_eq!(scanned, Err(Dropped::OutOfRange), "{u} {v}");
+        let refused = Sides::new(&triangle(u, v), &texture).map(|_| ());
+        assert_eq!(refused, Err(Dropped::OutOfRange), "{u} {v}");
     }
 }
 
@@ -108,7 +101,7 @@ fn a_triangle_has_its_one_affine_map() {
         let [a, b, c] =
             [&polygon[0], &polygon[1], &polygon[2]].map(|p| [p.x, p.y, p.u, p.v].map(i128::from));
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-        for ((x, y), (u, v)) in drawn(&polygon, &texture) {
+        for ((x, y), (u, v)) in drawn(&polygon, &texture, Sides::walk) {
             let (dx, dy) = (
                 i128::from(x) * 256 + 128 - a[0],
                 i128::from(y) * 256 + 128 - a[1],
