@@ -11,6 +11,7 @@
 
 mod ball;
 mod camera;
+mod clip;
 mod colour;
 mod mesh;
 mod noise;
@@ -20,8 +21,8 @@ mod stage;
 pub mod trig;
 
 pub use ball::{TEXELS, ball, paint_ball};
-pub use camera::{FOCAL_LENGTH, NEAR, project};
+pub use camera::{FOCAL_LENGTH, NEAR};
 pub use colour::{LIGHT_LEVELS, LightTable};
-pub use mesh::{Corner, Face, Mesh, Vec3};
+pub use mesh::{Corner, Face, MAX_CORNERS, MAX_EXTENT, Mesh, Vec3};
 pub use pose::{Orientation, Pose};
 pub use stage::{MAX_JOBS, MAX_VERTICES, SURFACE_BYTES, Scene, Stage, Storage};

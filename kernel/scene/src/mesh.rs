@@ -1,5 +1,16 @@
 //! Solids as borrowed slices, so that one built in and one loaded are the same type.
 
+use texmap::MAX_SIDES;
+
+use crate::clip::PLANES;
+
+/// Most corners of a face: clipping may add one at each of five planes, and what it makes still
+/// has to be a polygon of at most [`MAX_SIDES`].
+pub const MAX_CORNERS: usize = MAX_SIDES - PLANES;
+/// Largest coordinate of a mesh's vertex, either sign, 16.16: 64 units. Turned any way it stays
+/// below 2^23, and at [`Pose::MAX_DISTANCE`](crate::Pose::MAX_DISTANCE) below 2^24.
+pub const MAX_EXTENT: i32 = 64 << 16;
+
 /// A point or direction: x right, y down, z away from the viewer.
 pub type Vec3 = [i32; 3];
 
@@ -17,12 +28,12 @@ pub struct Corner {
     pub v: i32,
 }
 
-/// A flat face.
+/// A flat convex face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Face {
     /// Its first corner; the rest follow, clockwise when the face looks at the viewer.
     pub first: u16,
-    /// How many corners, 3 to [`texmap::MAX_SIDES`].
+    /// How many corners, 3 to [`MAX_CORNERS`].
     pub corners: u16,
     /// Which of the scene's textures.
     pub texture: u16,
@@ -33,7 +44,7 @@ pub struct Face {
 /// A solid.
 #[derive(Clone, Copy, Debug)]
 pub struct Mesh<'a> {
-    /// Points, 16.16.
+    /// Points, 16.16, each coordinate within +-[`MAX_EXTENT`].
     pub vertices: &'a [Vec3],
     /// Corners of all faces.
     pub corners: &'a [Corner],

@@ -3,8 +3,9 @@
 use modex::{Destination, HEIGHT, Palette};
 use texmap::{JobList, MAX_SIDES, Mapping, Renderer, Stats, Texture, Vertex};
 
+use crate::clip::{Point, place};
 use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
-use crate::{Face, Mesh, Pose, project};
+use crate::{MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 
 /// Most vertices of a mesh.
 pub const MAX_VERTICES: usize = 1024;
@@ -38,7 +39,7 @@ pub struct Scene<'a, 't> {
 #[derive(Debug)]
 pub struct Storage {
     surfaces: [u8; SURFACE_BYTES],
-    points: [Option<(i32, i32)>; MAX_VERTICES],
+    points: [Point; MAX_VERTICES],
     jobs: JobList<MAX_JOBS>,
 }
 
@@ -47,7 +48,7 @@ impl Storage {
     pub const fn new() -> Self {
         Self {
             surfaces: [0; SURFACE_BYTES],
-            points: [None; MAX_VERTICES],
+            points: [Point::ORIGIN; MAX_VERTICES],
             jobs: JobList::new(),
         }
     }
@@ -72,7 +73,7 @@ pub struct Stage<'a> {
     background: &'a [u8; HEIGHT],
     /// `surfaces[texture * LIGHT_LEVELS + level]`.
     surfaces: [Texture<'a>; MAX_TEXTURES * LIGHT_LEVELS],
-    points: &'a mut [Option<(i32, i32)>; MAX_VERTICES],
+    points: &'a mut [Point; MAX_VERTICES],
     jobs: &'a mut JobList<MAX_JOBS>,
 }
 
@@ -81,7 +82,8 @@ impl<'a> Stage<'a> {
     ///
     /// # Panics
     /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or textures
-    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together.
+    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together. If a face has fewer than
+    /// 3 or more than [`MAX_CORNERS`] corners, or a vertex is further out than [`MAX_EXTENT`].
     pub fn new(storage: &'a mut Storage, scene: Scene<'a, '_>) -> Self {
         assert!(
             scene.mesh.vertices.len() <= MAX_VERTICES && scene.textures.len() <= MAX_TEXTURES,
@@ -89,6 +91,21 @@ impl<'a> Stage<'a> {
             scene.mesh.vertices.len(),
             scene.textures.len(),
         );
+        for (i, face) in scene.mesh.faces.iter().enumerate() {
+            assert!(
+                (3..=MAX_CORNERS).contains(&usize::from(face.corners)),
+                "face {i} has {} corners; clipping leaves room for 3 to {MAX_CORNERS}",
+                face.corners,
+            );
+        }
+        for (i, vertex) in scene.mesh.vertices.iter().enumerate() {
+            assert!(
+                vertex
+                    .iter()
+                    .all(|k| (-MAX_EXTENT..=MAX_EXTENT).contains(k)),
+                "vertex {i} is at {vertex:?}, outside +-{MAX_EXTENT}",
+            );
+        }
         let Storage {
             surfaces: arena,
             points,
@@ -139,21 +156,31 @@ impl<'a> Stage<'a> {
         self.background
     }
 
-    /// Draws the solid in `pose` on a destination that holds the background.
+    /// Draws the solid in `pose` on a destination that holds the background. At a distance outside
+    /// 0 to [`Pose::MAX_DISTANCE`] every face is dropped; at any other none is.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
         let mesh = &self.mesh;
+        let mut renderer = Renderer::new(self.jobs, &self.surfaces, destination);
+        if !(0..=Pose::MAX_DISTANCE).contains(&pose.distance) {
+            for _ in mesh.faces {
+                renderer.drop_polygon();
+            }
+            return renderer.finish();
+        }
         let orientation = pose.orientation();
         for (point, &vertex) in self.points.iter_mut().zip(mesh.vertices) {
             let [x, y, z] = orientation.turn(vertex);
-            *point = project([x, y, z + pose.distance]);
+            *point = Point::new([x, y, z + pose.distance]);
         }
-        let mut renderer = Renderer::new(self.jobs, &self.surfaces, destination);
+        let mut polygon = [Vertex::default(); MAX_SIDES];
         for face in mesh.faces {
-            let mut polygon = [Vertex::default(); MAX_SIDES];
-            let polygon = &mut polygon[..usize::from(face.corners)];
-            if !place(mesh, face, self.points, polygon) {
+            let corners = &mesh.corners[usize::from(face.first)..][..usize::from(face.corners)];
+            let Some(sides) = place(corners, self.points, &mut polygon) else {
                 renderer.drop_polygon();
-            } else if looks_at_viewer(polygon) {
+                continue;
+            };
+            let polygon = &polygon[..sides];
+            if looks_at_viewer(polygon) {
                 let level = lit_level(orientation.turn(face.normal));
                 let surface = usize::from(face.texture) * LIGHT_LEVELS + level;
                 renderer.polygon(polygon, surface as u16, Mapping::Affine);
@@ -163,32 +190,10 @@ impl<'a> Stage<'a> {
     }
 }
 
-/// Fills `polygon` with the face's corners on the screen; false if one is too near the eye.
-fn place(
-    mesh: &Mesh<'_>,
-    face: &Face,
-    points: &[Option<(i32, i32)>],
-    polygon: &mut [Vertex],
-) -> bool {
-    let corners = &mesh.corners[usize::from(face.first)..][..polygon.len()];
-    for (vertex, corner) in polygon.iter_mut().zip(corners) {
-        let Some((x, y)) = points[usize::from(corner.vertex)] else {
-            return false;
-        };
-        *vertex = Vertex {
-            x,
-            y,
-            u: corner.u,
-            v: corner.v,
-        };
-    }
-    true
-}
-
 /// Whether the snapped polygon is wound clockwise on the screen (y down): its front.
 ///
 /// The snapped area decides, not the normal: what is drawn is the snapped polygon, and a face
-/// seen edge-on may have turned over in the snapping.
+/// seen edge-on may have turned over in the snapping. What clipping left nothing of has no area.
 fn looks_at_viewer(polygon: &[Vertex]) -> bool {
     let mut area = 0i64;
     for (i, a) in polygon.iter().enumerate() {

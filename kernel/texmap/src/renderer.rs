@@ -15,7 +15,7 @@ pub struct Stats {
     pub columns: u32,
     /// Pixels drawn.
     pub pixels: u32,
-    /// Polygons outside the legal range or too near the eye, not drawn.
+    /// Polygons outside the legal range, not drawn.
     pub dropped: u32,
     /// Times that the job list was full and had to be drawn before the picture was complete.
     pub full: u32,
