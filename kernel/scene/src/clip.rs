@@ -119,6 +119,13 @@ impl Point {
     }
 }
 
+impl Point {
+    /// In the viewer's space, 16.16.
+    pub fn view(&self) -> Vec3 {
+        self.view
+    }
+}
+
 /// A corner between the planes.
 #[derive(Clone, Copy, Default)]
 struct Placed {

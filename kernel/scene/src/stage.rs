@@ -1,11 +1,12 @@
 //! A scene made ready, and the way from a pose to polygons.
 
 use modex::{Destination, HEIGHT, Palette};
+use texmap::plane::{Anchor, Plane};
 use texmap::{JobList, MAX_SIDES, Mapping, Renderer, Stats, Texture, Vertex};
 
 use crate::clip::{Point, place};
 use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
-use crate::{MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
+use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 
 /// Most vertices of a mesh.
 pub const MAX_VERTICES: usize = 1024;
@@ -71,6 +72,7 @@ pub struct Stage<'a> {
     mesh: Mesh<'a>,
     palette: &'a Palette,
     background: &'a [u8; HEIGHT],
+    mapper: Mapper,
     /// `surfaces[texture * LIGHT_LEVELS + level]`.
     surfaces: [Texture<'a>; MAX_TEXTURES * LIGHT_LEVELS],
     points: &'a mut [Point; MAX_VERTICES],
@@ -135,6 +137,7 @@ impl<'a> Stage<'a> {
             mesh: scene.mesh,
             palette: scene.palette,
             background: scene.background,
+            mapper: Mapper::default(),
             surfaces,
             points,
             jobs,
@@ -156,37 +159,111 @@ impl<'a> Stage<'a> {
         self.background
     }
 
+    /// A texture in the light of a face, by the number that [`Drawn`] has.
+    pub fn surface(&self, number: u16) -> Texture<'a> {
+        self.surfaces[usize::from(number)]
+    }
+
+    /// Has the next pictures mapped in another way.
+    pub fn set_mapper(&mut self, mapper: Mapper) {
+        self.mapper = mapper;
+    }
+
     /// Draws the solid in `pose` on a destination that holds the background. At a distance outside
     /// 0 to [`Pose::MAX_DISTANCE`] every face is dropped; at any other none is.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
-        let mesh = &self.mesh;
         let mut renderer = Renderer::new(self.jobs, &self.surfaces, destination);
-        if !(0..=Pose::MAX_DISTANCE).contains(&pose.distance) {
-            for _ in mesh.faces {
-                renderer.drop_polygon();
+        let mapper = self.mapper;
+        polygons(&self.mesh, self.points, pose, |drawn| match drawn {
+            None => renderer.drop_polygon(),
+            Some(Drawn {
+                polygon,
+                surface,
+                anchors,
+            }) => {
+                let plane;
+                let mapping = match mapper {
+                    Mapper::Affine => Mapping::Affine,
+                    Mapper::HalfStep => Mapping::HalfStep,
+                    Mapper::Exact => {
+                        plane = Plane::new(&anchors, FOCAL_LENGTH);
+                        Mapping::Exact(&plane)
+                    }
+                };
+                renderer.polygon(polygon, surface, mapping);
             }
-            return renderer.finish();
-        }
-        let orientation = pose.orientation();
-        for (point, &vertex) in self.points.iter_mut().zip(mesh.vertices) {
-            let [x, y, z] = orientation.turn(vertex);
-            *point = Point::new([x, y, z + pose.distance]);
-        }
-        let mut polygon = [Vertex::default(); MAX_SIDES];
-        for face in mesh.faces {
-            let corners = &mesh.corners[usize::from(face.first)..][..usize::from(face.corners)];
-            let Some(sides) = place(corners, self.points, &mut polygon) else {
-                renderer.drop_polygon();
-                continue;
-            };
-            let polygon = &polygon[..sides];
-            if looks_at_viewer(polygon) {
-                let level = lit_level(orientation.turn(face.normal));
-                let surface = usize::from(face.texture) * LIGHT_LEVELS + level;
-                renderer.polygon(polygon, surface as u16, Mapping::Affine);
-            }
-        }
+        });
         renderer.finish()
+    }
+
+    /// Gives `sink` what [`Stage::draw`] would draw, in its order; nothing for a face that is
+    /// dropped.
+    pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(Option<Drawn<'_>>)) {
+        polygons(&self.mesh, self.points, pose, sink);
+    }
+}
+
+/// How a picture's texture coordinates are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Mapper {
+    /// [`Mapping::Affine`].
+    #[default]
+    Affine,
+    /// [`Mapping::HalfStep`].
+    HalfStep,
+    /// [`Mapping::Exact`].
+    Exact,
+}
+
+/// A face on the screen.
+#[derive(Clone, Copy, Debug)]
+pub struct Drawn<'p> {
+    /// Its snapped corners, those that clipping made with them.
+    pub polygon: &'p [Vertex],
+    /// Its texture, for [`Stage::surface`].
+    pub surface: u16,
+    /// Three of its corners in the viewer's space, none of them clipped: the texture's plane.
+    pub anchors: [Anchor; 3],
+}
+
+/// The faces that look at the viewer, in the mesh's order.
+fn polygons(
+    mesh: &Mesh<'_>,
+    points: &mut [Point; MAX_VERTICES],
+    pose: &Pose,
+    mut sink: impl FnMut(Option<Drawn<'_>>),
+) {
+    if !(0..=Pose::MAX_DISTANCE).contains(&pose.distance) {
+        return mesh.faces.iter().for_each(|_| sink(None));
+    }
+    let orientation = pose.orientation();
+    for (point, &vertex) in points.iter_mut().zip(mesh.vertices) {
+        let [x, y, z] = orientation.turn(vertex);
+        *point = Point::new([x, y, z + pose.distance]);
+    }
+    let mut polygon = [Vertex::default(); MAX_SIDES];
+    for face in mesh.faces {
+        let corners = &mesh.corners[usize::from(face.first)..][..usize::from(face.corners)];
+        let Some(sides) = place(corners, points, &mut polygon) else {
+            sink(None);
+            continue;
+        };
+        let polygon = &polygon[..sides];
+        if looks_at_viewer(polygon) {
+            let level = lit_level(orientation.turn(face.normal));
+            let surface = usize::from(face.texture) * LIGHT_LEVELS + level;
+            // Far from each other, so that of a face with many corners they are not on a line.
+            let anchors = [0, corners.len() / 3, 2 * corners.len() / 3].map(|i| Anchor {
+                position: points[usize::from(corners[i].vertex)].view(),
+                u: corners[i].u,
+                v: corners[i].v,
+            });
+            sink(Some(Drawn {
+                polygon,
+                surface: surface as u16,
+                anchors,
+            }));
+        }
     }
 }
 

@@ -12,3 +12,4 @@ pub mod coverage;
 pub mod mix;
 pub mod shrink;
 pub mod small_world;
+pub mod texel;

@@ -1,0 +1,89 @@
+//! Texture coordinates from their definition: affine, along the edges to the column's centre, then
+//! down the column.
+
+use texmap::Vertex;
+
+/// A coordinate as a quotient, in 16.16 texels; the divisor is above zero.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Coordinate {
+    /// What is divided.
+    pub n: i128,
+    /// What divides it.
+    pub d: i128,
+}
+
+impl Coordinate {
+    /// The texels that the coordinate may be read as when it is off by at most 2^-`bits` texel
+    /// (`bits` is at most 16), in a texture of `size` texels: one, or two neighbours. The last owns
+    /// its far border.
+    pub fn texels(self, bits: u32, size: u16) -> std::ops::RangeInclusive<u16> {
+        let texel = |by: i128| {
+            let n = self.n + by * (self.d << (16 - bits));
+            let texel = n.div_euclid(self.d << 16);
+            texel.clamp(0, i128::from(size) - 1) as u16
+        };
+        texel(-1)..=texel(1)
+    }
+}
+
+/// Where an edge crosses a column's centre: its height and coordinates there, over `dx`.
+struct Crossing {
+    dx: i128,
+    y: i128,
+    uv: [i128; 2],
+}
+
+/// The coordinates at the centre of a pixel inside of a convex polygon; none if its column meets
+/// no edge above or none below it.
+///
+/// Vertices are within the renderer's limit of 2^23: a side's dx is below 2^24, a crossing over it
+/// below 2^49, their difference over both dx below 2^74, and the quotients' parts below 2^124.
+pub fn affine(polygon: &[Vertex], x: i32, y: i32) -> Option<[Coordinate; 2]> {
+    let [xc, yc] = [x, y].map(|k| i128::from(k) * 256 + 128);
+    let mut above: Option<Crossing> = None;
+    let mut below: Option<Crossing> = None;
+    for (i, a) in polygon.iter().enumerate() {
+        let b = &polygon[(i + 1) % polygon.len()];
+        let (a, b) = if a.x <= b.x { (a, b) } else { (b, a) };
+        let [ax, ay, bx, by] = [a.x, a.y, b.x, b.y].map(i128::from);
+        if !(ax <= xc && xc < bx) {
+            continue;
+        }
+        let (dx, along) = (bx - ax, xc - ax);
+        let at = |a: i32, b: i32| i128::from(a) * dx + (i128::from(b) - i128::from(a)) * along;
+        let crossing = Crossing {
+            dx,
+            y: ay * dx + (by - ay) * along,
+            uv: [at(a.u, b.u), at(a.v, b.v)],
+        };
+        if crossing.y == yc * dx {
+            // On the edge itself nothing is left to interpolate.
+            return Some(crossing.uv.map(|n| Coordinate { n, d: dx }));
+        }
+        let nearer = |held: &Option<Crossing>, lower: bool| match held {
+            Some(held) => {
+                let (ours, theirs) = (crossing.y * held.dx, held.y * dx);
+                if lower { ours < theirs } else { ours > theirs }
+            }
+            None => true,
+        };
+        if crossing.y < yc * dx {
+            if nearer(&above, false) {
+                above = Some(crossing);
+            }
+        } else if nearer(&below, true) {
+            below = Some(crossing);
+        }
+    }
+    let (top, bottom) = (above?, below?);
+    // The height between them, and the part above the centre, over both dx and over the top's.
+    let height = bottom.y * top.dx - top.y * bottom.dx;
+    let part = yc * top.dx - top.y;
+    Some([0, 1].map(|k| {
+        let change = bottom.uv[k] * top.dx - top.uv[k] * bottom.dx;
+        Coordinate {
+            n: top.uv[k] * height + change * part,
+            d: top.dx * height,
+        }
+    }))
+}
