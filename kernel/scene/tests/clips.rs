@@ -398,3 +398,85 @@ fn meshes_that_clipping_has_no_room_for_are_refused() {
         assert_eq!(accepted(&solid), legal, "{solid:?}");
     }
 }
+
+/// An octahedron, every edge of which may lie exactly on pixels' centres.
+fn octahedron() -> Solid {
+    let one = 1 << 16;
+    let vertices = [
+        [one, 0, 0],
+        [-one, 0, 0],
+        [0, one, 0],
+        [0, -one, 0],
+        [0, 0, one],
+        [0, 0, -one],
+    ];
+    Solid::new(
+        &vertices,
+        &[
+            &[5, 0, 2],
+            &[0, 4, 2],
+            &[4, 1, 2],
+            &[1, 5, 2],
+            &[0, 5, 3],
+            &[4, 0, 3],
+            &[1, 4, 3],
+            &[5, 1, 3],
+        ],
+    )
+}
+
+/// Draws solids from outside and turned inside out, from a radius of a twentieth of a pixel on, and
+/// returns the pixels compared. What their fronts cover, their backs do, each pixel once: so the
+/// fronts leave no gap, and write nothing twice.
+fn closed_from_outside(poses: u32) -> u64 {
+    let mut random = random();
+    let [mut front_storage, mut back_storage] = [(); 2].map(|()| Box::new(Storage::new()));
+    let mut pixels = 0;
+    for solid in [Solid::ball(), Solid::cuboid([1 << 16; 3]), octahedron()] {
+        for shift in [0, 3, 6] {
+            let mut solid = solid.clone();
+            for vertex in &mut solid.vertices {
+                *vertex = vertex.map(|k| k >> shift);
+            }
+            let back = solid.clone().inside_out();
+            solid.on_stage(&mut front_storage, |front| {
+                back.on_stage(&mut back_storage, |back| {
+                    for _ in 0..poses / 3 {
+                        let bits = random.u32(17..23);
+                        let distance = random.i32(1 << bits..=(2 << bits).min(Pose::MAX_DISTANCE));
+                        let pose = pose(&mut random, distance);
+                        let [mut fronts, mut backs] = [Count::new(), Count::new()];
+                        front.draw(&pose, &mut *fronts);
+                        back.draw(&pose, &mut *backs);
+                        for (i, (&front, &back)) in
+                            fronts.times.iter().zip(&backs.times).enumerate()
+                        {
+                            let (x, y) = (i % WIDTH, i / WIDTH);
+                            assert!(
+                                front == back && front <= 1,
+                                "({x}, {y}) is written {front} times, by backs {back} times: \
+                                 {pose:?}, shift {shift}, {} vertices",
+                                solid.vertices.len()
+                            );
+                            pixels += u64::from(front);
+                        }
+                    }
+                });
+            });
+        }
+    }
+    pixels
+}
+
+#[test]
+fn closed_solids_are_written_once_from_outside() {
+    let pixels = closed_from_outside(300);
+    assert!(pixels > 500_000, "only {pixels} pixels");
+}
+
+/// `cargo test --release -p scene --test clips -- --ignored --nocapture`
+#[test]
+#[ignore = "10^5 orientations of each of three solids: minutes, and only in a release build"]
+fn closed_solids_are_written_once_at_a_hundred_thousand_orientations() {
+    println!("{} pixels", closed_from_outside(100_000));
+}
