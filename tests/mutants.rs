@@ -1,8 +1,10 @@
-//! Whether the checks of the emulated VGA and of the Mode X driver can fail: `cargo named-mutants`.
+//! Whether the checks of the emulated VGA, of the Mode X driver, of coverage and of the exact mapper
+//! can fail: `cargo named-mutants`.
 //!
 //! A mutant is one mistake that could be made, planted into a copy of the workspace: in the driver,
-//! or in the card that should find the driver's mistakes out. The tests of `emulator` and `modex`
-//! are run there, and one of them at least must fail: where a mutant survives a test is missing.
+//! in the card that should find the driver's mistakes out, or in the renderer. The tests of the
+//! crates that it concerns are run there, and one of them at least must fail: where a mutant
+//! survives a test is missing.
 //!
 //! A mutant names its place by the exact text, which must be in the file once. Every `cargo test`
 //! checks that, so the list can't rot.
@@ -31,9 +33,16 @@ const DAC: &str = "tests/emulator/src/dac.rs";
 const MEMORY: &str = "tests/emulator/src/memory.rs";
 const SCANOUT: &str = "tests/emulator/src/scanout.rs";
 const SEQUENCER: &str = "tests/emulator/src/sequencer.rs";
+const COVERAGE: &str = "kernel/texmap/src/coverage.rs";
+const EXACT: &str = "kernel/texmap/src/exact.rs";
 const VGA: &str = "tests/emulator/src/vga.rs";
 const DRIVER: &str = "kernel/modex/src/driver.rs";
 const REGISTERS: &str = "kernel/modex/src/registers.rs";
+
+/// The crates whose tests must kill a mutant of the driver or of the card.
+const CARD: [&str; 2] = ["--package=emulator", "--package=modex"];
+/// The crates whose tests must kill a mutant of coverage or of a mapper.
+const MAPPER: [&str; 2] = ["--package=texmap", "--package=oracle"];
 
 /// Columns: name; file; text; what it becomes.
 #[rustfmt::skip]
@@ -156,6 +165,23 @@ const MUTANTS: &[Mutant] = &[
         "dispi: true,", "dispi: false,"),
     mutant("faults forgotten with the card", VGA,
         "if !self.faults.is_empty() && ", "if false && "),
+    // Coverage and the exact mapper.
+    mutant("less for less or equal in the edge rule", COVERAGE,
+        "tie: |_| true,", "tie: |_| false,"),
+    mutant("columns by the transposed rule", COVERAGE,
+        "tie: |dy| dy <= 0,", "tie: |_| true,"),
+    mutant("level edges not past their own line", COVERAGE,
+        "tie: |dy| dy <= 0,", "tie: |dy| dy < 0,"),
+    mutant("a slope without its remainder", COVERAGE,
+        "self.left_over += self.left_over_step;", ""),
+    mutant("no pre-step to the first centre", COVERAGE,
+        "let p = offset(first, a.0);", "let p = 0 * offset(first, a.0);"),
+    mutant("an edge closed at its other end", COVERAGE,
+        "let first = ((a + 127) >> 8)", "let first = ((a + 128) >> 8)"),
+    mutant("a run's end not guarded", EXACT,
+        "(0..len).find(needs_no_clamp).unwrap_or(len)", "(0..len).find(needs_no_clamp).unwrap_or(len).min(0)"),
+    mutant("a quotient rounded", EXACT,
+        "(a / c) as usize", "((a + c / 2) / c) as usize"),
 ];
 
 const fn mutant(
@@ -204,8 +230,10 @@ fn every_mutant_has_its_place_in_the_source() {
 #[ignore = "builds and tests for minutes, once for each mutant; by `cargo named-mutants`"]
 fn every_mutant_is_killed() {
     let copy = Copy::new();
-    let run = copy.cargo(&["test"]);
-    assert!(run.well, "without a mutant:\n{}", run.output);
+    for packages in [CARD, MAPPER] {
+        let run = copy.cargo(&["test"], packages);
+        assert!(run.well, "without a mutant:\n{}", run.output);
+    }
     let (mut survivors, mut errors) = (Vec::new(), Vec::new());
     for (i, mutant) in (1..).zip(MUTANTS) {
         let fate = copy.fate(mutant);
@@ -292,8 +320,14 @@ impl Copy {
             Err(error) => return Fate::Error(error),
         };
         fs::write(&file, planted).unwrap();
-        let built = self.cargo(&["test", "--no-run"]);
-        let tested = built.well.then(|| self.cargo(&["test", "--no-fail-fast"]));
+        let packages = match mutant.file.starts_with("kernel/texmap") {
+            true => MAPPER,
+            false => CARD,
+        };
+        let built = self.cargo(&["test", "--no-run"], packages);
+        let tested = built
+            .well
+            .then(|| self.cargo(&["test", "--no-fail-fast"], packages));
         fs::write(&file, source).unwrap();
         let Some(tested) = tested else {
             return Fate::Error(format!("it does not compile:\n{}", built.output));
@@ -308,14 +342,15 @@ impl Copy {
         Fate::Killed(killers)
     }
 
-    /// Cargo in the copy, on the two crates.
-    fn cargo(&self, arguments: &[&str]) -> Run {
+    /// Cargo in the copy, on two crates.
+    fn cargo(&self, arguments: &[&str], packages: [&str; 2]) -> Run {
         let told = self.folder.path().join("output");
         let output = File::create(&told).unwrap();
         let mut cargo = child::family(env!("CARGO"));
         cargo
             .args(arguments)
-            .args(["--offline", "--package=emulator", "--package=modex"])
+            .arg("--offline")
+            .args(packages)
             .arg("--target-dir")
             .arg(self.folder.path().join("target"))
             .current_dir(self.source(""))

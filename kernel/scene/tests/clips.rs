@@ -425,13 +425,25 @@ fn octahedron() -> Solid {
     )
 }
 
-/// Draws solids from outside and turned inside out, from a radius of a twentieth of a pixel on, and
-/// returns the pixels compared. What their fronts cover, their backs do, each pixel once: so the
-/// fronts leave no gap, and write nothing twice.
-fn closed_from_outside(poses: u32) -> u64 {
+/// What drawing solids from outside came to.
+#[derive(Debug, Default)]
+struct Outside {
+    poses: u32,
+    pixels: u64,
+    /// Pixels written twice.
+    doubles: u32,
+}
+
+/// Draws solids from outside and turned inside out, from a radius of a twentieth of a pixel on.
+///
+/// What their fronts cover their backs do, each pixel as often: so the fronts leave no gap. Nearly
+/// always that is once. A facet at the silhouette may be turned over by snapping, though; it then
+/// lies on its neighbour, 1/256 pixel wide, and where a pixel's centre lies in that fold both
+/// cover it. No rule for single polygons can tell: culling by the real area would leave a gap.
+fn closed_from_outside(poses: u32) -> Outside {
     let mut random = random();
     let [mut front_storage, mut back_storage] = [(); 2].map(|()| Box::new(Storage::new()));
-    let mut pixels = 0;
+    let mut outside = Outside::default();
     for solid in [Solid::ball(), Solid::cuboid([1 << 16; 3]), octahedron()] {
         for shift in [0, 3, 6] {
             let mut solid = solid.clone();
@@ -448,35 +460,34 @@ fn closed_from_outside(poses: u32) -> u64 {
                         let [mut fronts, mut backs] = [Count::new(), Count::new()];
                         front.draw(&pose, &mut *fronts);
                         back.draw(&pose, &mut *backs);
-                        for (i, (&front, &back)) in
-                            fronts.times.iter().zip(&backs.times).enumerate()
-                        {
-                            let (x, y) = (i % WIDTH, i / WIDTH);
-                            assert!(
-                                front == back && front <= 1,
-                                "({x}, {y}) is written {front} times, by backs {back} times: \
-                                 {pose:?}, shift {shift}, {} vertices",
-                                solid.vertices.len()
-                            );
-                            pixels += u64::from(front);
-                        }
+                        let same = fronts.times == backs.times;
+                        assert!(same, "{pose:?}, shift {shift}, {solid:?}");
+                        let times = |n: u8| fronts.times.iter().filter(move |&&times| times == n);
+                        assert!(fronts.times.iter().all(|&times| times <= 2));
+                        outside.poses += 1;
+                        outside.pixels += (times(1).count() + times(2).count()) as u64;
+                        outside.doubles += times(2).count() as u32;
                     }
                 });
             });
         }
     }
-    pixels
+    println!("{outside:?}");
+    outside
 }
 
 #[test]
-fn closed_solids_are_written_once_from_outside() {
-    let pixels = closed_from_outside(300);
-    assert!(pixels > 500_000, "only {pixels} pixels");
+fn closed_solids_have_no_gap_from_outside_and_hardly_a_fold() {
+    let outside = closed_from_outside(300);
+    assert!(outside.pixels > 500_000);
+    // One in some ten thousand poses has one.
+    assert!(outside.doubles <= 3);
 }
 
 /// `cargo test --release -p scene --test clips -- --ignored --nocapture`
 #[test]
 #[ignore = "10^5 orientations of each of three solids: minutes, and only in a release build"]
-fn closed_solids_are_written_once_at_a_hundred_thousand_orientations() {
-    println!("{} pixels", closed_from_outside(100_000));
+fn closed_solids_have_no_gap_at_a_hundred_thousand_orientations() {
+    let outside = closed_from_outside(100_000);
+    assert!(outside.doubles * 10_000 <= outside.poses);
 }
