@@ -34,7 +34,13 @@ fn drawn(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> HashMap<(i32,
     pixels
 }
 
-fn vertex(random: &mut fastrand::Rng, centre: (i32, i32), spread: i32, snap: i32) -> Vertex {
+fn vertex(
+    random: &mut fastrand::Rng,
+    centre: (i32, i32),
+    spread: i32,
+    snap: i32,
+    size: (u16, u16),
+) -> Vertex {
     // Multiples of `snap` put vertices on pixel centres and edges on top of each other.
     let place = |random: &mut fastrand::Rng, centre: i32| {
         centre + random.i32(-spread..=spread) / snap * snap
@@ -42,8 +48,9 @@ fn vertex(random: &mut fastrand::Rng, centre: (i32, i32), spread: i32, snap: i32
     Vertex {
         x: place(random, centre.0),
         y: place(random, centre.1),
-        u: random.i32(0..=64) << 16,
-        v: random.i32(0..=16) << 16,
+        // Whole texels, both borders among them.
+        u: random.i32(0..=size.0.into()) << 16,
+        v: random.i32(0..=size.1.into()) << 16,
     }
 }
 
@@ -52,8 +59,7 @@ fn every_walk_stays_inside_the_texture() {
     let seed = fastrand::u64(..);
     println!("seed {seed}");
     let mut random = fastrand::Rng::with_seed(seed);
-    let texels = [0; 64 * 16];
-    let texture = Texture::new(&texels, 64, 16).unwrap();
+    let texels = vec![0; 256 * 256];
     let mut pixels = 0;
     for case in 0..20_000 {
         // The middle of the screen, its corners, and spreads from a pixel to beyond the screen.
@@ -62,8 +68,12 @@ fn every_walk_stays_inside_the_texture() {
         let spread = [256, 1024, 4096, 16384][case / 4 % 4];
         let snap = [1, 64, 128, 256][case / 16 % 4];
         let sides = random.usize(3..=8);
+        // The least, the largest, the narrowest, powers of two and not.
+        let size = [(1, 1), (256, 256), (256, 1), (1, 255), (64, 16), (3, 100)][case % 6];
+        let texels = &texels[..usize::from(size.0) * usize::from(size.1)];
+        let texture = Texture::new(texels, size.0, size.1).unwrap();
         let polygon: Vec<_> = (0..sides)
-            .map(|_| vertex(&mut random, centre, spread, snap))
+            .map(|_| vertex(&mut random, centre, spread, snap, size))
             .collect();
         let exact = drawn(&polygon, &texture, Sides::walk).len();
         assert_eq!(drawn(&polygon, &texture, Sides::half_step).len(), exact);
@@ -96,7 +106,7 @@ fn a_triangle_has_its_one_affine_map() {
     let mut compared = 0;
     for _ in 0..20_000 {
         let polygon: Vec<_> = (0..3)
-            .map(|_| vertex(&mut random, (160 * 256, 120 * 256), 30 * 256, 1))
+            .map(|_| vertex(&mut random, (160 * 256, 120 * 256), 30 * 256, 1, (64, 16)))
             .collect();
         let [a, b, c] =
             [&polygon[0], &polygon[1], &polygon[2]].map(|p| [p.x, p.y, p.u, p.v].map(i128::from));
@@ -115,6 +125,54 @@ fn a_triangle_has_its_one_affine_map() {
                 // 1/128 texel: 2^-8 where a texture is squeezed into a sliver, and 60 pixels of
                 // step, each cut by less than 2^-16.
                 assert!(off * 128 <= area.abs() << 16, "({x}, {y}) of {polygon:?}");
+            }
+            compared += 1;
+        }
+    }
+    assert!(compared > 1_000_000, "only {compared} pixels were compared");
+}
+
+/// No swimming: moved by 1/256 pixel, a texture moves under each pixel by what that is worth and
+/// no more than the mapper's own error twice.
+#[test]
+fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    let mut random = fastrand::Rng::with_seed(seed);
+    let texels = [0; 64 * 16];
+    let texture = Texture::new(&texels, 64, 16).unwrap();
+    let mut compared = 0;
+    for case in 0..5_000 {
+        let triangle: Vec<_> = (0..3)
+            .map(|_| vertex(&mut random, (160 * 256, 120 * 256), 60 * 256, 1, (64, 16)))
+            .collect();
+        let (dx, dy) = [(1, 0), (0, 1), (-1, 0), (0, -1)][case % 4];
+        let moved: Vec<_> = triangle
+            .iter()
+            .map(|&at| Vertex {
+                x: at.x + dx,
+                y: at.y + dy,
+                ..at
+            })
+            .collect();
+        let [a, b, c] = [0, 1, 2].map(|i| {
+            let at: &Vertex = &triangle[i];
+            [at.x, at.y, at.u, at.v].map(i128::from)
+        });
+        let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
+        let after = drawn(&moved, &texture, Sides::walk);
+        for (at, (u, v)) in drawn(&triangle, &texture, Sides::walk) {
+            let Some(&(u_after, v_after)) = after.get(&at) else {
+                continue;
+            };
+            for (k, before, after) in [(2, u, u_after), (3, v, v_after)] {
+                // The coordinate's change over `area` when the triangle moves by (dx, dy).
+                let across = (b[k] - a[k]) * (c[1] - a[1]) - (c[k] - a[k]) * (b[1] - a[1]);
+                let down = (c[k] - a[k]) * (b[0] - a[0]) - (b[k] - a[k]) * (c[0] - a[0]);
+                let worth = -(across * i128::from(dx) + down * i128::from(dy));
+                let change = i128::from(after - before) * area;
+                let off = (change - worth).abs();
+                assert!(off * 64 <= area.abs() << 16, "{at:?} of {triangle:?}");
             }
             compared += 1;
         }
