@@ -1,0 +1,88 @@
+//! The oracle of texture coordinates, checked itself: against big rationals and the one affine map
+//! of a triangle, on 10^5 pixels, extremes and vertices on pixels' centres among them.
+
+use num_bigint::BigInt;
+use num_rational::BigRational;
+use oracle::texel::{Coordinate, affine};
+use texmap::{MAX_COORDINATE, Vertex};
+
+/// The one affine map of a triangle at a pixel's centre; none if the centre is not inside.
+fn by_weights(triangle: &[Vertex; 3], x: i32, y: i32) -> Option<[BigRational; 2]> {
+    let big = |n: i64| BigRational::from_integer(BigInt::from(n));
+    let centre = [x, y].map(|k| big(i64::from(k) * 256 + 128));
+    let corners = triangle.map(|at| [big(at.x.into()), big(at.y.into())]);
+    // Twice the area of a corner pair with a point.
+    let area = |p: &[BigRational; 2], q: &[BigRational; 2], r: &[BigRational; 2]| {
+        (&q[0] - &p[0]) * (&r[1] - &p[1]) - (&r[0] - &p[0]) * (&q[1] - &p[1])
+    };
+    let whole = area(&corners[0], &corners[1], &corners[2]);
+    let zero = big(0);
+    if whole == zero {
+        return None;
+    }
+    let weights =
+        [0, 1, 2].map(|i| area(&centre, &corners[(i + 1) % 3], &corners[(i + 2) % 3]) / &whole);
+    if weights.iter().any(|weight| *weight < zero) {
+        return None;
+    }
+    let sum = |of: fn(&Vertex) -> i32| {
+        let parts = weights.iter().zip(triangle);
+        parts.fold(big(0), |sum, (weight, at)| {
+            sum + weight * big(of(at).into())
+        })
+    };
+    Some([sum(|at| at.u), sum(|at| at.v)])
+}
+
+#[test]
+fn affine_coordinates_are_those_of_big_rationals() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    let mut random = fastrand::Rng::with_seed(seed);
+    let (mut compared, mut case) = (0, 0);
+    while compared < 100_000 {
+        case += 1;
+        // A pixel's worth, the screen's, and the whole range; on a grid that brings ties.
+        let reach = [512, 100 * 256, MAX_COORDINATE][case % 3];
+        let snap = [1, 128][case / 3 % 2];
+        let mut vertex = || {
+            let mut place = || random.i32(-reach..=reach) / snap * snap;
+            Vertex {
+                x: place(),
+                y: place(),
+                u: random.i32(0..=256 << 16),
+                v: random.i32(0..=256 << 16),
+            }
+        };
+        let triangle = [vertex(), vertex(), vertex()];
+        let middle =
+            |of: fn(&Vertex) -> i32| triangle.iter().map(|at| of(at) / 3).sum::<i32>() / 256;
+        let near = (middle(|at| at.x), middle(|at| at.y));
+        for (x, y) in (-2..=2).flat_map(|i| (-2..=2).map(move |j| (near.0 + i, near.1 + j))) {
+            let Some(expected) = by_weights(&triangle, x, y) else {
+                continue;
+            };
+            // Where no column enters or leaves (its side is upright there), none is asked for.
+            let Some(found) = affine(&triangle, x, y) else {
+                continue;
+            };
+            for (Coordinate { n, d }, expected) in found.into_iter().zip(expected) {
+                let found = BigRational::new(BigInt::from(n), BigInt::from(d));
+                assert_eq!(found, expected, "({x}, {y}) of {triangle:?}");
+            }
+            compared += 1;
+        }
+    }
+}
+
+#[test]
+fn a_slack_reaches_the_neighbour_and_the_last_texel_owns_its_border() {
+    let at = |n: i128| Coordinate { n: 3 * n, d: 3 };
+    assert_eq!(at(5 << 16).texels(16, 8), 4..=5);
+    assert_eq!(at((5 << 16) + 1000).texels(7, 8), 5..=5);
+    assert_eq!(at((5 << 16) + 511).texels(7, 8), 4..=5);
+    assert_eq!(at((6 << 16) - 512).texels(7, 8), 5..=6);
+    assert_eq!(at((6 << 16) - 513).texels(7, 8), 5..=5);
+    assert_eq!(at(8 << 16).texels(7, 8), 7..=7);
+    assert_eq!(at(0).texels(7, 8), 0..=0);
+}
