@@ -3,6 +3,9 @@
 //! Each test boots a machine of its own, so that one failure leaves the others alone; set-up is
 //! one locked step that all of them take.
 
+mod judged;
+mod ready;
+
 use std::fs::File;
 use std::io::{BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -13,27 +16,15 @@ use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 use crystal_ball::card::{Card, Emulated};
-use crystal_ball::machine::{Config, Failure, Machine, Verdict};
-use crystal_ball::setup::{self, Options, Ready};
+use crystal_ball::machine::{Machine, Verdict};
+use judged::{Judged, verdict};
 use link::{Command, Fault, Picture};
 use modex::registers::MODE_X;
+use ready::{READY, config};
 use show::Memory;
-
-static READY: LazyLock<Ready> =
-    LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
-
-fn config() -> Config {
-    Config::new(&READY)
-}
 
 fn boot() -> Machine {
     Machine::boot(&config()).expect("boots")
-}
-
-/// What went wrong, for a run that must not go well.
-fn verdict<T: std::fmt::Debug>(result: anyhow::Result<T>) -> Failure {
-    let error = result.expect_err("the run ended well");
-    error.downcast().expect("a failure with a verdict")
 }
 
 #[test]
@@ -102,17 +93,6 @@ fn the_running_show_paces_itself_and_can_be_held() {
     machine.ask(Command::Run).unwrap();
     machine.wait_until_running().unwrap();
     machine.leave().unwrap();
-}
-
-/// A failure whose evidence goes when the test has ended well, and stays when it has not.
-struct Judged(Failure);
-
-impl Drop for Judged {
-    fn drop(&mut self) {
-        if let (Some(folder), false) = (&self.0.evidence, std::thread::panicking()) {
-            std::fs::remove_dir_all(folder).unwrap();
-        }
-    }
 }
 
 /// Asks the kernel to break, and returns how that was judged.

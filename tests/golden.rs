@@ -4,6 +4,8 @@
 //! collected over all goldens before the verdict, and a report shows it
 //! (`target/crystal-ball/golden/report.html`).
 
+mod ready;
+
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::LazyLock;
@@ -11,19 +13,12 @@ use std::sync::LazyLock;
 use crystal_ball::card::{Card, Emulated};
 use crystal_ball::diff::Subject;
 use crystal_ball::golden::{self, Findings, Golden, Transfer};
-use crystal_ball::machine::{Config, Machine};
-use crystal_ball::setup::{self, Options, Ready};
+use crystal_ball::machine::Machine;
 use emulator::Access;
 use link::{Command, Content, Picture};
+use ready::{READY, config};
 use show::Memory;
 use tempfile::TempDir;
-
-static READY: LazyLock<Ready> =
-    LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
-
-fn config() -> Config {
-    Config::new(&READY)
-}
 
 fn goldens() -> Vec<Golden> {
     golden::find(&golden::folder()).expect("the golden frames")

@@ -3,26 +3,26 @@
 //! QEMU is real and so is the image. QEMU is started by a small script that gives it another
 //! socket for COM1; what comes there is passed on to the program, altered.
 
+mod judged;
+mod ready;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::Shutdown;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
-use std::sync::LazyLock;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::Duration;
 
 use crystal_ball::card::{Card, Emulated};
 use crystal_ball::dump::Dump;
-use crystal_ball::machine::{Config, Failure, Machine, Verdict};
-use crystal_ball::setup::{self, Options, Ready};
+use crystal_ball::machine::{Config, Machine, Verdict};
+use judged::{Judged, verdict};
 use link::{Command, Content, Picture};
+use ready::{READY, config};
 use show::Memory;
 use tempfile::TempDir;
-
-static READY: LazyLock<Ready> =
-    LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
 
 /// What becomes of a line of the kernel's, its end included.
 type Alter = Box<dyn FnMut(&[u8]) -> Vec<u8> + Send>;
@@ -55,7 +55,7 @@ exec '{}' \"$@\"
     let config = Config {
         qemu: script,
         arguments: arguments.into_iter().map(Into::into).collect(),
-        ..Config::new(&READY)
+        ..config()
     };
     let mut machine = Machine::boot(&config).expect("boots");
     machine.show(&[Picture::Frame(480)]).expect("shows");
@@ -79,17 +79,6 @@ fn pass_on(listener: &UnixListener, host: &Path, mut alter: Alter) {
     // The other thread holds both sockets open, too.
     for socket in [host, kernel.into_inner()] {
         let _ = socket.shutdown(Shutdown::Both);
-    }
-}
-
-/// A failure whose evidence goes when the test has ended well.
-struct Judged(Failure);
-
-impl Drop for Judged {
-    fn drop(&mut self) {
-        if let (Some(folder), false) = (&self.0.evidence, thread::panicking()) {
-            std::fs::remove_dir_all(folder).unwrap();
-        }
     }
 }
 
@@ -118,8 +107,7 @@ fn dump_altered(
 
 #[track_caller]
 fn judged(outcome: anyhow::Result<Dump>) -> Judged {
-    let error = outcome.expect_err("the dump was accepted");
-    Judged(error.downcast().expect("a failure with a verdict"))
+    Judged(verdict(outcome))
 }
 
 #[test]
@@ -306,7 +294,7 @@ fn a_host_that_stops_reading_is_waited_for() {
 
 #[test]
 fn noise_on_the_line_is_answered_and_survived() {
-    let mut machine = Machine::boot(&Config::new(&READY)).unwrap();
+    let mut machine = Machine::boot(&config()).unwrap();
     machine.ask(Command::Hold).unwrap();
     for (noise, reason) in [
         (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
@@ -341,7 +329,7 @@ fn noise_on_the_line_is_answered_and_survived() {
 /// A flood of lines that are none, each of them answered, and the picture is as it was.
 #[test]
 fn a_flood_of_noise_changes_no_byte() {
-    let mut machine = Machine::boot(&Config::new(&READY)).unwrap();
+    let mut machine = Machine::boot(&config()).unwrap();
     machine.show(&[Picture::Frame(7)]).unwrap();
     let before = machine.ask(Command::Checksums(Content::Memory)).unwrap();
     let seed = std::process::id();

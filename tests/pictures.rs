@@ -3,11 +3,10 @@
 
 use std::fmt;
 
-use crystal_ball::golden;
-use link::Picture;
+use crystal_ball::golden::{self, Golden};
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::coverage::inside;
-use oracle::texel::affine;
+use oracle::texel::{affine, perspective};
 use scene::{Drawn, FOCAL_LENGTH, Mapper, Pose, Stage, Storage};
 use texmap::plane::Plane;
 use texmap::{Point, Texture};
@@ -16,21 +15,10 @@ use texmap::{Point, Texture};
 /// texture is squeezed into a sliver, and 240 steps, each cut by less than 2^-16.
 const AFFINE_BITS: u32 = 7;
 
-fn pose(picture: Picture) -> Pose {
-    match picture {
-        Picture::Frame(frame) => Pose::at_tick(frame),
-        Picture::Pose {
-            yaw,
-            pitch,
-            roll,
-            distance,
-        } => Pose {
-            yaw,
-            pitch,
-            roll,
-            distance: distance as i32,
-        },
-    }
+/// The pose of a golden's last picture.
+fn pose(golden: &Golden) -> Pose {
+    let picture = golden.show.last().expect("a golden shows something");
+    show::pose(*picture).expect("a golden's pose is legal")
 }
 
 /// What the definitions allow at each pixel: the colours, and how many polygons cover it.
@@ -58,13 +46,8 @@ fn colours(drawn: &Drawn<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: 
             };
             let (a, b, c) = (at(plane.a), at(plane.b), at(plane.c));
             let texel = |n: i128, size: u16| {
-                let last = i128::from(size) - 1;
-                let texel = match (n < 0, c > 0) {
-                    (true, _) => 0,
-                    (false, true) => n.div_euclid(c).min(last),
-                    (false, false) => last,
-                };
-                texel as u16..=texel as u16
+                let texel = perspective(n, c, size);
+                texel..=texel
             };
             (texel(a, width), texel(b, height))
         }
@@ -144,7 +127,7 @@ fn every_golden_is_what_the_oracle_draws() {
     let mut stage = Stage::new(&mut storage, scene::ball(&textures));
     let mut between = 0;
     for golden in golden::find(&golden::folder()).unwrap() {
-        let pose = pose(*golden.show.last().unwrap());
+        let pose = pose(&golden);
         // The committed picture: affine.
         let picture = golden.picture().unwrap().expect("it was blessed");
         let affine = expected(&mut stage, &pose, Mapper::Affine);
@@ -181,10 +164,7 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     let mut storage = Box::new(Storage::new());
     let mut stage = Stage::new(&mut storage, scene::ball(&textures));
     let goldens = golden::find(&golden::folder()).unwrap();
-    let mut poses: Vec<_> = goldens
-        .iter()
-        .map(|golden| pose(*golden.show.last().unwrap()))
-        .collect();
+    let mut poses: Vec<_> = goldens.iter().map(pose).collect();
     poses.extend((0..100).map(|_| {
         let furthest = 1 << random.u32(18..24);
         Pose {

@@ -271,7 +271,7 @@ impl<'a, B: Bus> Show<'a, B> {
 }
 
 /// The pose of a picture; none if it is outside the legal range.
-fn pose(picture: Picture) -> Option<Pose> {
+pub fn pose(picture: Picture) -> Option<Pose> {
     match picture {
         Picture::Frame(frame) => Some(Pose::at_tick(frame)),
         Picture::Pose {

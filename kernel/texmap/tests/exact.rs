@@ -2,6 +2,7 @@
 //! against the real one.
 
 use modex::{Destination, PlanarBuffer};
+use oracle::texel::perspective;
 use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING};
 use texmap::{Texture, exact};
 
@@ -34,16 +35,6 @@ fn real(anchors: &[Anchor; 3], x: u16, y: u16) -> [i128; 3] {
         }
     }
     forms.map(|form| if volume < 0 { -form } else { form })
-}
-
-/// The definition's texel: the floor of the quotient, the nearest one in the texture.
-fn texel(n: i128, c: i128, size: i128) -> u8 {
-    let texel = match (n < 0, c > 0) {
-        (true, _) => 0,
-        (false, true) => n.div_euclid(c).min(size - 1),
-        (false, false) => size - 1,
-    };
-    texel as u8
 }
 
 /// A point that the screen, or its neighbourhood, shows.
@@ -148,8 +139,9 @@ fn compare(least: u64, random: &mut fastrand::Rng) -> (u64, u64) {
             let [us, vs] = axes.draw(&mut page, &plane, (x, y, len));
             for (y, (u, v)) in (y..).zip(us.into_iter().zip(vs)) {
                 let [a, b, c] = [plane.a, plane.b, plane.c].map(|form| i128::from(form.at(x, y)));
+                let texel = |n, size| perspective(n, c, size) as u8;
+                let expected = (texel(a, w), texel(b, h));
                 let (w, h) = (i128::from(w), i128::from(h));
-                let expected = (texel(a, c, w), texel(b, c, h));
                 assert_eq!((u, v), expected, "({x}, {y}) of {anchors:?} on {w} x {h}");
                 samples += 1;
                 clamped += u64::from(a < 0 || b < 0 || a >= w * c || b >= h * c);

@@ -1,5 +1,5 @@
-//! Texture coordinates from their definition: affine, along the edges to the column's centre, then
-//! down the column.
+//! Texture coordinates from their definitions: affine, along the edges to the column's centre, then
+//! down the column; with perspective, the floor of a quotient.
 
 use texmap::Vertex;
 
@@ -86,4 +86,17 @@ pub fn affine(polygon: &[Vertex], x: i32, y: i32) -> Option<[Coordinate; 2]> {
             d: top.dx * height,
         }
     }))
+}
+
+/// The texel of a perspective coordinate n / c in a texture of `size` texels: the quotient's floor,
+/// outside of the texture the nearest. On the horizon and beyond it, where c is not above zero, it
+/// is the one that the quotient runs off to before.
+pub fn perspective(n: i128, c: i128, size: u16) -> u16 {
+    let last = i128::from(size) - 1;
+    let texel = match (n < 0, c > 0) {
+        (true, _) => 0,
+        (false, true) => n.div_euclid(c).min(last),
+        (false, false) => last,
+    };
+    texel as u16
 }
