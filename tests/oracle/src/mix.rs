@@ -400,7 +400,8 @@ impl Draw {
                 3 => -limit + self.random.i32(0..512),
                 4 => self.within(limit),
                 5 => self.within(limit) / 16,
-                6 => self.within(limit) / 256 * 256 + 128,
+                // The centre of the outermost pixel that has one inside the limit.
+                6 => self.within(limit - 128) / 256 * 256 + 128,
                 _ => on_screen,
             }
         };
