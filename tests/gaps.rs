@@ -11,7 +11,7 @@ use std::fs::File;
 use std::path::Path;
 
 use crystal_ball::indexed::Indexed;
-use modex::{Column, Destination, HEIGHT, PlanarBuffer, WIDTH};
+use modex::{Destination, HEIGHT, Lane, PlanarBuffer, STRIDE, WIDTH};
 use texmap::{JobList, Mapping, Renderer, Texture, Vertex};
 
 /// Fields of the sheet across and down.
@@ -125,11 +125,20 @@ fn mixed() -> Page {
 struct Noted<'a>(&'a mut Page, u8, PlanarBuffer);
 
 impl Destination for Noted<'_> {
-    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+    fn select(&mut self, _: u16) {}
+
+    fn lane<const STEP: usize>(
+        &mut self,
+        x: u16,
+        y: u16,
+        len: u16,
+        draw: impl FnOnce(Lane<'_, STEP>),
+    ) {
+        assert_eq!(STEP, STRIDE, "columns alone are drawn");
         for y in y..y + len {
             self.0.write(x.into(), y.into(), self.1);
         }
-        self.2.column(x, y, len, draw);
+        self.2.lane(x, y, len, draw);
     }
 }
 

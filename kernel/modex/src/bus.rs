@@ -1,6 +1,6 @@
 //! How ports and video memory are reached.
 
-use crate::Column;
+use crate::Lane;
 
 /// Why an access is made, so that a bus that counts can count apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -36,9 +36,9 @@ pub trait Bus {
     fn store64(&mut self, at: u16, bytes: u64);
     /// Loads the byte at `at`, of the plane that Read Map names. All four latches are filled.
     fn load8(&mut self, at: u16) -> u8;
-    /// Lends `draw` the `len` bytes at `at`, `at + 80`, ..., and carries out what it stored
+    /// Lends `draw` the `len` bytes at `at`, `at + STEP`, ..., and carries out what it stored
     /// before returning. All of them lie inside the window.
-    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>));
+    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>));
     /// Announces what the next accesses are for.
     fn purpose(&mut self, _purpose: Purpose) {}
 }
@@ -69,8 +69,8 @@ impl<B: Bus> Bus for &mut B {
         B::load8(self, at)
     }
 
-    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
-        B::column(self, at, len, draw);
+    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
+        B::lane(self, at, len, draw);
     }
 
     fn purpose(&mut self, purpose: Purpose) {

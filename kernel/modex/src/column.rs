@@ -5,33 +5,72 @@ use core::ptr::NonNull;
 
 use crate::STRIDE;
 
-/// A place for pixels, addressed by column.
+/// A place for pixels, addressed by runs that lie in one plane.
+///
+/// Which plane stores reach is the destination's state, as it is the card's: [`select`] it, then
+/// ask for [`lane`]s of that plane. [`column`] does both.
+///
+/// [`select`]: Destination::select
+/// [`lane`]: Destination::lane
+/// [`column`]: Destination::column
 pub trait Destination {
+    /// Selects the plane of screen column `x`.
+    fn select(&mut self, x: u16);
+
+    /// Lends `draw` the `len` pixels from (x, y) on, `STEP` bytes apart, their plane already
+    /// selected: with [`STRIDE`] a column; with 1 every fourth pixel of a row.
+    ///
+    /// # Panics
+    /// If the lane is empty or leaves the 320x240 picture: coverage never asks for that, and
+    /// a store outside the page would show up in another one.
+    fn lane<const STEP: usize>(
+        &mut self,
+        x: u16,
+        y: u16,
+        len: u16,
+        draw: impl FnOnce(Lane<'_, STEP>),
+    );
+
     /// Lends `draw` the `len` pixels from (x, y) down, their plane selected.
     ///
     /// # Panics
-    /// If the column is empty or leaves the 320x240 picture: coverage never asks for that, and
-    /// a store outside the page would show up in another one.
-    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>));
+    /// As [`Destination::lane`].
+    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+        self.select(x);
+        self.lane(x, y, len, draw);
+    }
+
+    /// Writes the `len` pixels from (x, y) to the right, the plane selected for each.
+    ///
+    /// # Panics
+    /// As [`Destination::lane`].
+    fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {
+        for x in x..x + len {
+            self.column(x, y, 1, |pixel| pixel.fill(&mut texel));
+        }
+    }
 }
 
-/// `len` bytes at a base and then every 80: a column of one plane, open for writing once.
+/// A column of one plane: 80 bytes from pixel to pixel.
+pub type Column<'a> = Lane<'a, STRIDE>;
+
+/// `len` bytes of one plane, a base and then every `STEP`, open for writing once.
 ///
 /// The only type that stores to video memory one byte at a time. The stores are volatile: the
 /// compiler sees neither the card's planes nor the port writes that select them, and was seen
 /// deleting a plain store as overwritten.
 #[derive(Debug)]
-pub struct Column<'a> {
+pub struct Lane<'a, const STEP: usize> {
     base: NonNull<u8>,
     len: u16,
     lent: PhantomData<&'a mut u8>,
 }
 
-impl Column<'_> {
-    /// A column of `len` bytes from `base`.
+impl<const STEP: usize> Lane<'_, STEP> {
+    /// A lane of `len` bytes from `base`.
     ///
     /// # Safety
-    /// For as long as the column lives, `base.add(i * STRIDE)` is valid for volatile writes of
+    /// For as long as the lane lives, `base.add(i * STEP)` is valid for volatile writes of
     /// a byte for every `i < len`, and nothing else reads or writes there.
     pub unsafe fn new(base: NonNull<u8>, len: u16) -> Self {
         Self {
@@ -41,20 +80,36 @@ impl Column<'_> {
         }
     }
 
-    /// The first `rows` pixels, and those after them.
+    /// Pixels.
+    pub fn len(&self) -> u16 {
+        self.len
+    }
+
+    /// Whether it has none.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Where the first byte is. What [`Lane::new`] was promised holds as long as the lane lives:
+    /// a tuned loop writes there, volatile, and nowhere else.
+    pub fn as_ptr(&mut self) -> *mut u8 {
+        self.base.as_ptr()
+    }
+
+    /// The first `pixels`, and those after them.
     ///
     /// # Panics
     /// If there are not so many.
-    pub fn split(self, rows: u16) -> (Self, Self) {
-        assert!(rows <= self.len, "{rows} of {} pixels", self.len);
+    pub fn split(self, pixels: u16) -> (Self, Self) {
+        assert!(pixels <= self.len, "{pixels} of {} pixels", self.len);
         let Self { base, len, lent } = self;
         // The last pixel may be the last byte of what is lent: no pointer goes past it.
-        let after = match rows < len {
-            // SAFETY: `rows < len`, so by the contract of `new` the address is inside.
-            true => unsafe { base.add(usize::from(rows) * STRIDE) },
+        let after = match pixels < len {
+            // SAFETY: `pixels < len`, so by the contract of `new` the address is inside.
+            true => unsafe { base.add(usize::from(pixels) * STEP) },
             false => base,
         };
-        let (first, second) = (rows, len - rows);
+        let (first, second) = (pixels, len - pixels);
         let first = Self {
             base,
             len: first,
@@ -68,13 +123,13 @@ impl Column<'_> {
         (first, second)
     }
 
-    /// Writes every pixel from the top down; `texel` is called once for each.
+    /// Writes every pixel in order; `texel` is called once for each.
     #[inline(always)]
     pub fn fill(self, mut texel: impl FnMut() -> u8) {
-        for row in 0..usize::from(self.len) {
+        for pixel in 0..usize::from(self.len) {
             let value = texel();
-            // SAFETY: `row < len`, so by the contract of `new` the address is inside.
-            let at = unsafe { self.base.add(row * STRIDE) };
+            // SAFETY: `pixel < len`, so by the contract of `new` the address is inside.
+            let at = unsafe { self.base.add(pixel * STEP) };
             // SAFETY: the same contract makes it valid for a volatile write.
             unsafe { at.write_volatile(value) };
         }

@@ -1,7 +1,7 @@
 //! Exact counts of what reaches the card.
 
 use crate::registers::{MAP_MASK, SEQUENCER};
-use crate::{Bus, Column, Purpose};
+use crate::{Bus, Lane, Purpose};
 
 /// What was written for one purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -119,11 +119,11 @@ impl<B: Bus> Bus for Counted<B> {
         self.bus.load8(at)
     }
 
-    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
         let tally = self.counts.of(self.purpose);
         tally.stores += u64::from(len);
         tally.bytes += u64::from(len);
-        self.bus.column(at, len, draw);
+        self.bus.lane(at, len, draw);
     }
 
     fn purpose(&mut self, purpose: Purpose) {

@@ -4,7 +4,7 @@ use core::fmt;
 
 use crate::registers::*;
 use crate::{
-    Bus, Column, Destination, HEIGHT, PAGE_BYTES, PAGES, PLANE_BYTES, Purpose, STRIDE, WIDTH,
+    Bus, Destination, HEIGHT, Lane, PAGE_BYTES, PAGES, PLANE_BYTES, Purpose, STRIDE, WIDTH,
 };
 
 /// A colour of the DAC: red, green, blue, 0 to 63 each.
@@ -66,10 +66,12 @@ impl Drawn {
         bottom: [HEIGHT as u16; GROUPS],
     };
 
-    fn add(&mut self, x: u16, y: u16, len: u16) {
-        let group = usize::from(x / GROUP_PIXELS);
-        self.top[group] = self.top[group].min(y);
-        self.bottom[group] = self.bottom[group].max(y + len);
+    /// The pixel columns `first..=last`, lines `top..bottom`.
+    fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
+        for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
+            self.top[group] = self.top[group].min(top);
+            self.bottom[group] = self.bottom[group].max(bottom);
+        }
     }
 }
 
@@ -255,23 +257,42 @@ pub struct Canvas<'a, B> {
 }
 
 impl<B: Bus> Destination for Canvas<'_, B> {
-    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
-        let (column, top, _) = check_column(x, y, len);
-        self.drawn.add(x, y, len);
+    fn select(&mut self, x: u16) {
         write(self.bus, SEQUENCER, MAP_MASK, 1 << (x & 3));
-        let at = self.page_start + top * STRIDE + column / 4;
-        self.bus.column(at as u16, len, draw);
+    }
+
+    fn lane<const STEP: usize>(
+        &mut self,
+        x: u16,
+        y: u16,
+        len: u16,
+        draw: impl FnOnce(Lane<'_, STEP>),
+    ) {
+        let (last, bottom) = check_lane::<STEP>(x, y, len);
+        self.drawn.add(x, last, y, bottom);
+        let at = self.page_start + usize::from(y) * STRIDE + usize::from(x) / 4;
+        self.bus.lane(at as u16, len, draw);
     }
 }
 
-/// A column's x, y and length, checked to lie in the picture.
-pub(crate) fn check_column(x: u16, y: u16, len: u16) -> (usize, usize, usize) {
-    let (x, y, len) = (usize::from(x), usize::from(y), usize::from(len));
+/// The last screen column of a lane, and the line after its last; checked to lie in the picture.
+pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u16) {
+    const {
+        assert!(
+            STEP == STRIDE || STEP == 1,
+            "columns, or every fourth pixel of a row"
+        )
+    };
+    let more = len.wrapping_sub(1);
+    let (right, down) = if STEP == STRIDE { (0, more) } else { (more, 0) };
     assert!(
-        x < WIDTH && len >= 1 && y + len <= HEIGHT,
-        "a column of {len} at ({x}, {y}) is not in the picture"
+        x < WIDTH as u16
+            && y < HEIGHT as u16
+            && right <= (WIDTH as u16 - 1 - x) / 4
+            && down < HEIGHT as u16 - y,
+        "{len} pixels, {STEP} bytes apart, at ({x}, {y}) are not in the picture"
     );
-    (x, y, len)
+    (x + 4 * right, y + down + 1)
 }
 
 fn page_start(page: usize) -> usize {

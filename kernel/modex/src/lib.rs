@@ -29,7 +29,7 @@ mod planar;
 pub mod registers;
 
 pub use bus::{Bus, Purpose};
-pub use column::{Column, Destination};
+pub use column::{Column, Destination, Lane};
 pub use count::{Counted, Counts, Tally};
 pub use driver::{Canvas, ModeX, Palette, Readback, Rgb6};
 pub use planar::PlanarBuffer;

@@ -2,7 +2,8 @@
 
 use core::ptr::NonNull;
 
-use crate::{Column, Destination, HEIGHT, PAGE_BYTES, STRIDE, WIDTH};
+use crate::driver::check_lane;
+use crate::{Destination, HEIGHT, Lane, PAGE_BYTES, STRIDE, WIDTH};
 
 /// Four planes of one page: pixel (x, y) is `planes[x & 3][80 y + x / 4]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -45,13 +46,23 @@ impl Default for PlanarBuffer {
 }
 
 impl Destination for PlanarBuffer {
-    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
-        let (x, top, len) = crate::driver::check_column(x, y, len);
+    /// All planes can be reached at any time.
+    fn select(&mut self, _: u16) {}
+
+    fn lane<const STEP: usize>(
+        &mut self,
+        x: u16,
+        y: u16,
+        len: u16,
+        draw: impl FnOnce(Lane<'_, STEP>),
+    ) {
+        check_lane::<STEP>(x, y, len);
+        let (x, top, bytes) = (usize::from(x), usize::from(y), usize::from(len) - 1);
         let plane = &mut self.planes[x & 3];
-        let bytes = &mut plane[top * STRIDE + x / 4..][..(len - 1) * STRIDE + 1];
+        let bytes = &mut plane[top * STRIDE + x / 4..][..bytes * STEP + 1];
         let base = NonNull::from(bytes).cast::<u8>();
-        // SAFETY: the slice spans the column from its first byte to its last, it was cut with
+        // SAFETY: the slice spans the lane from its first byte to its last, it was cut with
         // bounds checks, and its exclusive borrow lives until `draw` returns.
-        draw(unsafe { Column::new(base, len as u16) });
+        draw(unsafe { Lane::new(base, len) });
     }
 }

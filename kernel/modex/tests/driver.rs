@@ -5,8 +5,8 @@ use std::ptr::NonNull;
 
 use modex::registers::*;
 use modex::{
-    Bus, Column, Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PAGES, PLANE_BYTES, PlanarBuffer,
-    STRIDE, Tally, WIDTH,
+    Bus, Counted, Destination, HEIGHT, Lane, ModeX, PAGE_BYTES, PAGES, PLANE_BYTES, PlanarBuffer,
+    Tally, WIDTH,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,15 +125,15 @@ impl Bus for Recorder {
         self.planes[usize::from(plane)][usize::from(at)]
     }
 
-    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
-        let mut staging = vec![0; usize::from(len - 1) * STRIDE + 1];
+    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
+        let mut staging = vec![0; usize::from(len - 1) * STEP + 1];
         let base = NonNull::from(&mut staging[..]).cast();
-        // SAFETY: the staging bytes span the column and are reached by nothing else meanwhile.
-        draw(unsafe { Column::new(base, len) });
-        for row in 0..usize::from(len) {
-            let at = usize::from(at) + row * STRIDE;
+        // SAFETY: the staging bytes span the lane and are reached by nothing else meanwhile.
+        draw(unsafe { Lane::new(base, len) });
+        for pixel in 0..usize::from(len) {
+            let at = usize::from(at) + pixel * STEP;
             self.log.push(Access::Store(at as u16));
-            self.store(at, staging[row * STRIDE]);
+            self.store(at, staging[pixel * STEP]);
         }
     }
 }
@@ -314,7 +314,7 @@ fn a_dead_card_is_told_and_not_waited_for() {
 }
 
 #[test]
-#[should_panic(expected = "is not in the picture")]
+#[should_panic(expected = "are not in the picture")]
 fn a_column_beyond_the_page_is_refused() {
     PlanarBuffer::new().column(0, 200, 41, |column| column.fill(|| 0));
 }

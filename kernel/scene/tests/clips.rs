@@ -1,7 +1,7 @@
 //! Whole solids at every distance: nothing dropped, and from inside no pixel left out or written
 //! twice.
 
-use modex::{Column, Destination, HEIGHT, Palette, PlanarBuffer, WIDTH};
+use modex::{Destination, HEIGHT, Lane, Palette, PlanarBuffer, STRIDE, WIDTH};
 use scene::{
     Corner, Face, LIGHT_LEVELS, LightTable, MAX_CORNERS, MAX_EXTENT, Mesh, Pose, Scene, Stage,
     Storage, Vec3,
@@ -30,12 +30,21 @@ impl Count {
 }
 
 impl Destination for Count {
-    fn column(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
+    fn select(&mut self, _: u16) {}
+
+    fn lane<const STEP: usize>(
+        &mut self,
+        x: u16,
+        y: u16,
+        len: u16,
+        draw: impl FnOnce(Lane<'_, STEP>),
+    ) {
+        assert_eq!(STEP, STRIDE, "columns alone are drawn");
         for row in y..y + len {
             let times = &mut self.times[usize::from(row) * WIDTH + usize::from(x)];
             *times = times.saturating_add(1);
         }
-        self.page.column(x, y, len, draw);
+        self.page.lane(x, y, len, draw);
     }
 }
 

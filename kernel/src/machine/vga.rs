@@ -2,7 +2,7 @@
 
 use core::ptr::NonNull;
 
-use modex::{Bus, Column, PLANE_BYTES, STRIDE};
+use modex::{Bus, Lane, PLANE_BYTES};
 
 use super::ports;
 
@@ -64,15 +64,15 @@ impl Bus for Window {
         unsafe { place.read_volatile() }
     }
 
-    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
-        let end = usize::from(at) + usize::from(len.saturating_sub(1)) * STRIDE;
+    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
+        let end = usize::from(at) + usize::from(len.saturating_sub(1)) * STEP;
         assert!(
             end < PLANE_BYTES,
-            "a column of {len} at {at:04x} leaves the window"
+            "{len} pixels, {STEP} bytes apart, at {at:04x} leave the window"
         );
         // SAFETY: `at` is inside the window.
         let base = unsafe { self.base.add(usize::from(at)) };
-        // SAFETY: from `at` to `end` the column is inside the window, which `self` alone reaches.
-        draw(unsafe { Column::new(base, len) });
+        // SAFETY: from `at` to `end` the lane is inside the window, which `self` alone reaches.
+        draw(unsafe { Lane::new(base, len) });
     }
 }

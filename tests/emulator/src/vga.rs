@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::ptr::NonNull;
 
 use modex::registers::*;
-use modex::{Bus, Column, PAGE_BYTES, PLANE_BYTES, Purpose, STRIDE};
+use modex::{Bus, Lane, PAGE_BYTES, PLANE_BYTES, Purpose};
 
 use crate::attribute::Attribute;
 use crate::crtc::Crtc;
@@ -404,18 +404,19 @@ impl Bus for Vga {
         self.memory.load(at, self.graphics.read_map())
     }
 
-    fn column(&mut self, at: u16, len: u16, draw: impl FnOnce(Column<'_>)) {
-        let last = usize::from(at) + usize::from(len.saturating_sub(1)) * STRIDE;
+    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
+        let span = usize::from(len.saturating_sub(1)) * STEP;
+        let last = usize::from(at) + span;
         if last >= PLANE_BYTES {
-            let state = format!("a column of {len} ends at {last:X}h");
+            let state = format!("a lane of {len} ends at {last:X}h");
             self.note(Access::Store(at, 0), Err(("store past the window", state)));
         }
-        let mut staging = vec![0; usize::from(len.saturating_sub(1)) * STRIDE + 1];
+        let mut staging = vec![0; span + 1];
         let base = NonNull::from(&mut staging[..]).cast();
-        // SAFETY: the staging bytes span the column, and nothing else reaches them meanwhile.
-        draw(unsafe { Column::new(base, len) });
-        for (row, &byte) in (0..len).zip(staging.iter().step_by(STRIDE)) {
-            self.store(at.wrapping_add(row * STRIDE as u16), byte);
+        // SAFETY: the staging bytes span the lane, and nothing else reaches them meanwhile.
+        draw(unsafe { Lane::new(base, len) });
+        for (pixel, &byte) in (0..len).zip(staging.iter().step_by(STEP)) {
+            self.store(at.wrapping_add(pixel * STEP as u16), byte);
         }
     }
 

@@ -2,7 +2,7 @@
 
 use emulator::{Access, Vga};
 use modex::registers::*;
-use modex::{Bus, HEIGHT, ModeX, Purpose, WIDTH};
+use modex::{Bus, HEIGHT, ModeX, Purpose, STRIDE, WIDTH};
 
 /// A colour for each entry, no two alike.
 fn palette() -> [[u8; 3]; 256] {
@@ -106,8 +106,8 @@ fn a_page_wraps_within_the_planes() {
     vga.finish_frame();
     vga.purpose(Purpose::Setup);
     vga.out16(SEQUENCER, word(MAP_MASK, 1));
-    vga.column(0xFFB0, 1, |column| column.fill(|| 8));
-    vga.column(0x0000, 1, |column| column.fill(|| 9));
+    vga.lane::<STRIDE>(0xFFB0, 1, |column| column.fill(|| 8));
+    vga.lane::<STRIDE>(0x0000, 1, |column| column.fill(|| 9));
     let page = vga.page().unwrap();
     assert_eq!(page.start, 0xFFB0);
     assert_eq!((page.pixels[0], page.pixels[WIDTH]), (8, 9));
@@ -120,7 +120,7 @@ fn play(vga: &mut Vga, log: &[Access]) {
             Access::Out16(port, value) => vga.out16(port, value),
             Access::In8(port) => _ = vga.in8(port),
             Access::In16(port) => _ = vga.in16(port),
-            Access::Store(at, value) => vga.column(at, 1, |column| column.fill(|| value)),
+            Access::Store(at, value) => vga.lane::<STRIDE>(at, 1, |column| column.fill(|| value)),
             Access::Load(at) => _ = vga.load8(at),
             Access::ScanOut => {}
         }

@@ -2,7 +2,7 @@
 
 use emulator::Vga;
 use modex::registers::*;
-use modex::{Bus, Destination, HEIGHT, ModeX, Purpose};
+use modex::{Bus, Destination, HEIGHT, ModeX, Purpose, STRIDE};
 
 const BLACK: [[u8; 3]; 256] = [[0; 3]; 256];
 
@@ -99,15 +99,15 @@ fn what_a_card_drops_or_garbles() {
     });
     faults("unaligned store", "A000:4B04", |v| v.store64(0x4B04, 0));
     let mut vga = card();
-    vga.column(0xFFC0, 2, |column| column.fill(|| 0));
+    vga.lane::<STRIDE>(0xFFC0, 2, |column| column.fill(|| 0));
     assert_eq!(vga.take_faults()[0].name, "store past the window");
     faults("address past the last page", "A000:E100", |v| {
         v.purpose(Purpose::Draw);
-        v.column(0xE100, 1, |column| column.fill(|| 1));
+        v.lane::<STRIDE>(0xE100, 1, |column| column.fill(|| 1));
     });
     faults("store to a page that is seen", "is on the screen", |v| {
         v.purpose(Purpose::Draw);
-        v.column(0x4AFF, 1, |column| column.fill(|| 1));
+        v.lane::<STRIDE>(0x4AFF, 1, |column| column.fill(|| 1));
     });
     faults(
         "store to a page that is seen",
@@ -115,7 +115,7 @@ fn what_a_card_drops_or_garbles() {
         |v| {
             v.out16(CRTC, word(START_ADDRESS_HIGH, 0x4B));
             v.purpose(Purpose::Erase);
-            v.column(0x4B00, 1, |column| column.fill(|| 1));
+            v.lane::<STRIDE>(0x4B00, 1, |column| column.fill(|| 1));
         },
     );
     faults(
@@ -185,7 +185,7 @@ fn what_a_fresh_card_does_not_take() {
     assert_eq!(
         after(&|v| {
             v.out16(SEQUENCER, word(4, 0x06));
-            v.column(0, 1, |column| column.fill(|| 0));
+            v.lane::<STRIDE>(0, 1, |column| column.fill(|| 0));
         }),
         ["register was never written"]
     );
@@ -195,7 +195,7 @@ fn what_a_fresh_card_does_not_take() {
 fn a_store_is_told_when_the_window_is_elsewhere() {
     let mut vga = card();
     vga.out16(GRAPHICS, word(6, 0x0D));
-    vga.column(0x5000, 1, |column| column.fill(|| 1));
+    vga.lane::<STRIDE>(0x5000, 1, |column| column.fill(|| 1));
     let names: Vec<_> = vga.take_faults().iter().map(|fault| fault.name).collect();
     assert_eq!(names, ["unused value", "window is not at A0000h"]);
 }
@@ -204,10 +204,10 @@ fn a_store_is_told_when_the_window_is_elsewhere() {
 fn what_is_like_a_fault_and_is_none() {
     let mut vga = card();
     // A page that is shown may be set up, and drawn on while the screen is off.
-    vga.column(0, 1, |column| column.fill(|| 1));
+    vga.lane::<STRIDE>(0, 1, |column| column.fill(|| 1));
     vga.out16(SEQUENCER, word(CLOCKING_MODE, 0x21));
     vga.purpose(Purpose::Draw);
-    vga.column(0, 1, |column| column.fill(|| 1));
+    vga.lane::<STRIDE>(0, 1, |column| column.fill(|| 1));
     // PAS closes the palette registers, and no others.
     vga.in8(INPUT_STATUS_1);
     vga.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE | 0x10);
@@ -278,7 +278,7 @@ fn a_load_fills_the_latches_and_a_peek_does_not() {
     let mut vga = card();
     for plane in 0..4 {
         vga.out16(SEQUENCER, word(MAP_MASK, 1 << plane));
-        vga.column(0x5000, 1, |column| column.fill(|| 10 + plane));
+        vga.lane::<STRIDE>(0x5000, 1, |column| column.fill(|| 10 + plane));
     }
     for plane in 0..4 {
         vga.out16(GRAPHICS, word(4, plane));
