@@ -12,7 +12,8 @@ use std::path::Path;
 
 use crystal_ball::indexed::Indexed;
 use modex::{Destination, HEIGHT, Lane, PlanarBuffer, STRIDE, WIDTH};
-use texmap::{JobList, Mapping, Renderer, Texture, Vertex};
+use texmap::plane::Anchor;
+use texmap::{Face, JobList, Mapper, Order, Renderer, Texture, Vertex};
 
 /// Fields of the sheet across and down.
 const FIELDS: (i32, i32) = (9, 7);
@@ -154,8 +155,15 @@ fn exact() -> Page {
         });
         let mut jobs = JobList::<64>::new();
         let mut noted = Noted(&mut page, kind, PlanarBuffer::new());
-        let mut renderer = Renderer::new(&mut jobs, &textures, &mut noted);
-        renderer.polygon(&polygon, 0, Mapping::Affine);
+        let (mapper, order) = (Mapper::default(), Order::default());
+        let mut renderer = Renderer::new(&mut jobs, &textures, &mut noted, mapper, order);
+        renderer.face(&Face {
+            polygon: &polygon,
+            texture: 0,
+            // Affine: no plane is asked for.
+            anchors: [Anchor::default(); 3],
+            focal_length: 1,
+        });
         renderer.finish();
     }
     page

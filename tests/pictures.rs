@@ -7,9 +7,8 @@ use crystal_ball::golden::{self, Golden};
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::coverage::inside;
 use oracle::texel::{affine, perspective};
-use scene::{Drawn, FOCAL_LENGTH, Mapper, Pose, Stage, Storage};
-use texmap::plane::Plane;
-use texmap::{Point, Texture};
+use scene::{FOCAL_LENGTH, Pose, Stage, Storage};
+use texmap::{Face, Mapper, Point, Texture};
 
 /// The affine mapper's coordinates are within 2^-7 texel of the exact ones: 2^-8 where a whole
 /// texture is squeezed into a sliver, and 240 steps, each cut by less than 2^-16.
@@ -34,12 +33,12 @@ impl fmt::Debug for Expected {
 }
 
 /// The colours that `texture` has where `drawn` is seen through the centre of (x, y).
-fn colours(drawn: &Drawn<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i32) -> Vec<u8> {
+fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i32) -> Vec<u8> {
     let (width, height) = (texture.width(), texture.height());
     let (columns, rows) = match mapper {
         Mapper::Exact => {
             // The definition: the floor of the quotient of the plane's integers.
-            let plane = Plane::new(&drawn.anchors, FOCAL_LENGTH);
+            let plane = drawn.plane();
             let at = |form: texmap::plane::Form| {
                 let along = i128::from(form.right) * i128::from(x);
                 i128::from(form.origin) + along + i128::from(form.down) * i128::from(y)
@@ -56,7 +55,9 @@ fn colours(drawn: &Drawn<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: 
             (u.texels(AFFINE_BITS, width), v.texels(AFFINE_BITS, height))
         }
     };
-    let texel = |i, j: u16| texture.texels()[usize::from(j) * usize::from(width) + usize::from(i)];
+    let texel = |i, j: u16| {
+        texture.texels()[usize::from(j) * usize::from(texture.pitch()) + usize::from(i)]
+    };
     rows.flat_map(|j| columns.clone().map(move |i| (i, j)))
         .map(|(i, j)| texel(i, j))
         .collect()
@@ -73,14 +74,15 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
     let mut seen = Vec::new();
     stage.polygons(pose, |drawn| {
         let drawn = drawn.expect("nothing legal is dropped");
-        seen.push((drawn.polygon.to_vec(), drawn.surface, drawn.anchors));
+        seen.push((drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });
     for (polygon, surface, anchors) in seen {
         let texture = stage.surface(surface);
-        let drawn = Drawn {
+        let drawn = Face {
             polygon: &polygon,
-            surface,
+            texture: surface,
             anchors,
+            focal_length: FOCAL_LENGTH,
         };
         let points: Vec<Point> = polygon.iter().map(|&vertex| vertex.into()).collect();
         // Every pixel whose centre may be inside, and one more around.
@@ -130,7 +132,7 @@ fn every_golden_is_what_the_oracle_draws() {
         let pose = pose(&golden);
         // The committed picture: affine.
         let picture = golden.picture().unwrap().expect("it was blessed");
-        let affine = expected(&mut stage, &pose, Mapper::Affine);
+        let affine = expected(&mut stage, &pose, Mapper::default());
         compare(&golden.name, &affine, |i| picture.pixels[i]);
         between += affine
             .colours
@@ -143,7 +145,7 @@ fn every_golden_is_what_the_oracle_draws() {
         page.clear(stage.background());
         stage.set_mapper(Mapper::Exact);
         let stats = stage.draw(&pose, &mut *page);
-        stage.set_mapper(Mapper::Affine);
+        stage.set_mapper(Mapper::default());
         assert_eq!(stats.dropped, 0, "{}", golden.name);
         let name = format!("{} by the exact mapper", golden.name);
         compare(&name, &exact, |i| page.pixel(i % WIDTH, i / WIDTH));

@@ -295,7 +295,7 @@ mod tests {
         let texels = vec![0; 1 << 16];
         let texture = Texture::new(&texels, 256, 256).unwrap();
         let mut pixels = vec![false; WIDTH * HEIGHT];
-        let legal = Sides::new(polygon, &texture).and_then(|_| {
+        let legal = Sides::new(polygon, &texture, coverage::Axis::Down).and_then(|_| {
             coverage::columns(polygon, |run| {
                 for y in run.first..run.first + run.len {
                     pixels[usize::from(y) * WIDTH + usize::from(run.line)] ^= true;

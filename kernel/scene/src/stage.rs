@@ -1,8 +1,8 @@
 //! A scene made ready, and the way from a pose to polygons.
 
 use modex::{Destination, HEIGHT, Palette};
-use texmap::plane::{Anchor, Plane};
-use texmap::{JobList, MAX_SIDES, Mapping, Renderer, Stats, Texture, Vertex};
+use texmap::plane::Anchor;
+use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex};
 
 use crate::clip::{Point, place};
 use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
@@ -12,8 +12,8 @@ use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 pub const MAX_VERTICES: usize = 1024;
 /// Column jobs that are collected before they are drawn.
 pub const MAX_JOBS: usize = 4096;
-/// Room for a scene's textures, each once per light level.
-pub const SURFACE_BYTES: usize = 1 << 20;
+/// Room for a scene's textures, each padded and once per light level: one of the largest.
+pub const SURFACE_BYTES: usize = 3 << 19;
 /// Most textures of a scene.
 const MAX_TEXTURES: usize = 8;
 
@@ -45,7 +45,7 @@ pub struct Storage {
 }
 
 impl Storage {
-    /// Empty arenas. About 1.1 MiB: meant for a static.
+    /// Empty arenas. About 2 MiB: meant for a static.
     pub const fn new() -> Self {
         Self {
             surfaces: [0; SURFACE_BYTES],
@@ -73,6 +73,7 @@ pub struct Stage<'a> {
     palette: &'a Palette,
     background: &'a [u8; HEIGHT],
     mapper: Mapper,
+    order: Order,
     /// `surfaces[texture * LIGHT_LEVELS + level]`.
     surfaces: [Texture<'a>; MAX_TEXTURES * LIGHT_LEVELS],
     points: &'a mut [Point; MAX_VERTICES],
@@ -84,7 +85,7 @@ impl<'a> Stage<'a> {
     ///
     /// # Panics
     /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or textures
-    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together. If a face has fewer than
+    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together, each padded to powers of two. If a face has fewer than
     /// 3 or more than [`MAX_CORNERS`] corners, or a vertex is further out than [`MAX_EXTENT`].
     pub fn new(storage: &'a mut Storage, scene: Scene<'a, '_>) -> Self {
         assert!(
@@ -121,14 +122,19 @@ impl<'a> Stage<'a> {
             .zip(surfaces.chunks_exact_mut(LIGHT_LEVELS))
         {
             for (light, surface) in scene.light.iter().zip(surfaces) {
+                let (width, height) = (texture.width(), texture.height());
                 let (lit, rest) = free
-                    .split_at_mut_checked(texture.texels().len())
+                    .split_at_mut_checked(Texture::padded_len(width, height))
                     .expect("the scene's textures are larger than the surface arena");
                 free = rest;
-                for (lit, &texel) in lit.iter_mut().zip(texture.texels()) {
-                    *lit = light[usize::from(texel)];
+                let pitch = usize::from(width).next_power_of_two();
+                let rows = texture.texels().chunks_exact(texture.pitch().into());
+                for (lit, row) in lit.chunks_exact_mut(pitch).zip(rows) {
+                    for (lit, &texel) in lit.iter_mut().zip(&row[..width.into()]) {
+                        *lit = light[usize::from(texel)];
+                    }
                 }
-                *surface = Texture::new(lit, texture.width(), texture.height())
+                *surface = Texture::padded(lit, width, height)
                     .expect("a lit copy has the sides of its texture");
             }
         }
@@ -138,6 +144,7 @@ impl<'a> Stage<'a> {
             palette: scene.palette,
             background: scene.background,
             mapper: Mapper::default(),
+            order: Order::default(),
             surfaces,
             points,
             jobs,
@@ -159,9 +166,14 @@ impl<'a> Stage<'a> {
         self.background
     }
 
-    /// A texture in the light of a face, by the number that [`Drawn`] has.
+    /// A texture in the light of a face, by the number that [`Face`] has.
     pub fn surface(&self, number: u16) -> Texture<'a> {
         self.surfaces[usize::from(number)]
+    }
+
+    /// How pictures are mapped.
+    pub fn mapper(&self) -> Mapper {
+        self.mapper
     }
 
     /// Has the next pictures mapped in another way.
@@ -169,61 +181,33 @@ impl<'a> Stage<'a> {
         self.mapper = mapper;
     }
 
+    /// In which order a picture's runs are drawn.
+    pub fn order(&self) -> Order {
+        self.order
+    }
+
+    /// Has the next pictures' runs drawn in another order.
+    pub fn set_order(&mut self, order: Order) {
+        self.order = order;
+    }
+
     /// Draws the solid in `pose` on a destination that holds the background. At a distance outside
     /// 0 to [`Pose::MAX_DISTANCE`] every face is dropped; at any other none is.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
-        let mut renderer = Renderer::new(self.jobs, &self.surfaces, destination);
-        let mapper = self.mapper;
-        polygons(&self.mesh, self.points, pose, |drawn| match drawn {
-            None => renderer.drop_polygon(),
-            Some(Drawn {
-                polygon,
-                surface,
-                anchors,
-            }) => {
-                let plane;
-                let mapping = match mapper {
-                    Mapper::Affine => Mapping::Affine,
-                    Mapper::HalfStep => Mapping::HalfStep,
-                    Mapper::Exact => {
-                        plane = Plane::new(&anchors, FOCAL_LENGTH);
-                        Mapping::Exact(&plane)
-                    }
-                };
-                renderer.polygon(polygon, surface, mapping);
-            }
+        let (mapper, order) = (self.mapper, self.order);
+        let mut renderer = Renderer::new(self.jobs, &self.surfaces, destination, mapper, order);
+        polygons(&self.mesh, self.points, pose, |face| match face {
+            None => renderer.drop_face(),
+            Some(face) => renderer.face(&face),
         });
         renderer.finish()
     }
 
     /// Gives `sink` what [`Stage::draw`] would draw, in its order; nothing for a face that is
     /// dropped.
-    pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(Option<Drawn<'_>>)) {
+    pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(Option<Face<'_>>)) {
         polygons(&self.mesh, self.points, pose, sink);
     }
-}
-
-/// How a picture's texture coordinates are found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Mapper {
-    /// [`Mapping::Affine`].
-    #[default]
-    Affine,
-    /// [`Mapping::HalfStep`].
-    HalfStep,
-    /// [`Mapping::Exact`].
-    Exact,
-}
-
-/// A face on the screen.
-#[derive(Clone, Copy, Debug)]
-pub struct Drawn<'p> {
-    /// Its snapped corners, those that clipping made with them.
-    pub polygon: &'p [Vertex],
-    /// Its texture, for [`Stage::surface`].
-    pub surface: u16,
-    /// Three of its corners in the viewer's space, none of them clipped: the texture's plane.
-    pub anchors: [Anchor; 3],
 }
 
 /// The faces that look at the viewer, in the mesh's order.
@@ -231,7 +215,7 @@ fn polygons(
     mesh: &Mesh<'_>,
     points: &mut [Point; MAX_VERTICES],
     pose: &Pose,
-    mut sink: impl FnMut(Option<Drawn<'_>>),
+    mut sink: impl FnMut(Option<Face<'_>>),
 ) {
     if !(0..=Pose::MAX_DISTANCE).contains(&pose.distance) {
         return mesh.faces.iter().for_each(|_| sink(None));
@@ -258,10 +242,11 @@ fn polygons(
                 u: corners[i].u,
                 v: corners[i].v,
             });
-            sink(Some(Drawn {
+            sink(Some(Face {
                 polygon,
-                surface: surface as u16,
+                texture: surface as u16,
                 anchors,
+                focal_length: FOCAL_LENGTH,
             }));
         }
     }

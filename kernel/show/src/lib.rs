@@ -24,7 +24,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Where an answer's lines go, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
-/// The fixed memory of the program. About 1.2 MiB: meant for a static.
+/// The fixed memory of the program. About 2 MiB: meant for a static.
 #[derive(Debug)]
 pub struct Memory {
     texels: [u8; TEXELS],

@@ -8,10 +8,10 @@
 //! coordinate is off by less than n 2^-16 texel, at most 0.0037 over 240. The half steps are
 //! another rule: see [`Sides::half_step`].
 
-use modex::{Column, WIDTH};
+use modex::{Column, HEIGHT, WIDTH};
 
 use crate::along::Along;
-use crate::coverage::{self, Dropped, Run};
+use crate::coverage::{self, Axis, Dropped, Run};
 use crate::{MAX_SIDES, Texture, Vertex};
 
 /// The texture coordinates along a side of the polygon.
@@ -22,26 +22,36 @@ struct Side {
 }
 
 impl Side {
-    /// The side from `a` to `b` in either order; of one that crosses no column nobody asks.
-    fn new(a: &Vertex, b: &Vertex) -> Self {
-        // Always from left to right: neighbours walk a shared edge with the same bits.
-        let (a, b) = if a.x <= b.x { (a, b) } else { (b, a) };
-        let Some((first, _)) = coverage::crossed(a.x, b.x, WIDTH as i32) else {
+    /// The side from `a` to `b` in either order, at the lines that go along `axis`; of one that
+    /// crosses none nobody asks.
+    fn new(a: &Vertex, b: &Vertex, axis: Axis) -> Self {
+        let (across, lines): (fn(&Vertex) -> i32, _) = match axis {
+            Axis::Down => (|vertex| vertex.x, WIDTH),
+            Axis::Right => (|vertex| vertex.y, HEIGHT),
+        };
+        // Always forward: neighbours walk a shared edge with the same bits.
+        let (a, b) = if across(a) <= across(b) {
+            (a, b)
+        } else {
+            (b, a)
+        };
+        let (from, to) = (across(a), across(b));
+        let Some((first, _)) = coverage::crossed(from, to, lines as i32) else {
             return Self::default();
         };
-        let dx = i64::from(b.x) - i64::from(a.x);
-        let along = |a: i32, b: i32, x: i64| Along::new(a, i64::from(b - a), dx, first, x, 16);
-        let x = coverage::offset(first, a.x);
+        let length = i64::from(to) - i64::from(from);
+        let offset = coverage::offset(first, from);
+        let along = |a: i32, b: i32| Along::new(a, i64::from(b - a), length, first, offset, 16);
         Self {
-            u: along(a.u, b.u, x),
-            v: along(a.v, b.v, x),
+            u: along(a.u, b.u),
+            v: along(a.v, b.v),
         }
     }
 }
 
 /// A walk through the texture, 16.16.
 ///
-/// For every row i of its column, `u + i du` and `v + i dv` lie inside the texture: the two end
+/// For every pixel i of its run, `u + i du` and `v + i dv` lie inside the texture: the two end
 /// values were clamped into it and the steps are cut towards zero, so nothing between can leave
 /// it. The mapper does not clamp.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -50,10 +60,36 @@ pub struct Walk {
     pub u: i32,
     /// Down the texture, at the first pixel's centre.
     pub v: i32,
-    /// Step of `u` from a pixel to the one below.
+    /// Step of `u` from a pixel to the next.
     pub du: i32,
-    /// Step of `v` from a pixel to the one below.
+    /// Step of `v` from a pixel to the next.
     pub dv: i32,
+}
+
+impl Walk {
+    /// The walk from pixel `pixels` of this one on, in steps of `stride` pixels.
+    pub fn every(&self, stride: i32, pixels: i32) -> Self {
+        let Self { u, v, du, dv } = *self;
+        Self {
+            u: u + pixels * du,
+            v: v + pixels * dv,
+            du: stride * du,
+            dv: stride * dv,
+        }
+    }
+}
+
+/// The coordinates, pixel after pixel.
+impl Iterator for Walk {
+    type Item = (i32, i32);
+
+    fn next(&mut self) -> Option<(i32, i32)> {
+        let here = (self.u, self.v);
+        // The last addition steps past the run; |u| and |du| are below 2^25, so it fits.
+        self.u += self.du;
+        self.v += self.dv;
+        Some(here)
+    }
 }
 
 /// The texture coordinates along all sides of a polygon.
@@ -65,11 +101,11 @@ pub struct Sides {
 }
 
 impl Sides {
-    /// Those of `polygon` in `texture`.
+    /// Those of `polygon` in `texture`, at the lines that go along `axis`.
     ///
     /// # Errors
     /// A polygon outside the legal range, or coordinates outside the texture.
-    pub fn new(polygon: &[Vertex], texture: &Texture<'_>) -> Result<Self, Dropped> {
+    pub fn new(polygon: &[Vertex], texture: &Texture<'_>, axis: Axis) -> Result<Self, Dropped> {
         coverage::check(polygon)?;
         let (width, height) = (texture.width(), texture.height());
         let inside = |vertex: &Vertex| {
@@ -81,7 +117,7 @@ impl Sides {
         }
         let mut sides = [Side::default(); MAX_SIDES];
         for (i, a) in polygon.iter().enumerate() {
-            sides[i] = Side::new(a, &polygon[(i + 1) % polygon.len()]);
+            sides[i] = Side::new(a, &polygon[(i + 1) % polygon.len()], axis);
         }
         Ok(Self {
             sides,
@@ -89,7 +125,7 @@ impl Sides {
         })
     }
 
-    /// The walk down a run of [`coverage::columns`].
+    /// The walk along a run of [`coverage::runs`] on the same axis.
     ///
     /// The coordinates at the first and the last pixel's centre are interpolated between the two
     /// crossings, then clamped into the texture; the step between them is cut towards zero.
@@ -167,22 +203,13 @@ impl Sides {
     }
 }
 
-/// Draws one column.
+/// Draws one column, the texel's index multiplied out for each pixel: the clear twin of
+/// [`crate::loops`].
 #[inline]
-pub fn column(texture: &Texture<'_>, walk: &Walk, column: Column<'_>) {
-    let texels = texture.texels();
-    let width = usize::from(texture.width());
-    let Walk {
-        mut u,
-        mut v,
-        du,
-        dv,
-    } = *walk;
+pub fn column(texture: &Texture<'_>, mut walk: Walk, column: Column<'_>) {
     column.fill(|| {
-        let texel = texels[(v >> 16) as usize * width + (u >> 16) as usize];
-        // The last addition steps past the column; |u| and |du| are below 2^25, so it fits.
-        u += du;
-        v += dv;
-        texel
+        let (u, v) = (walk.u, walk.v);
+        walk = walk.every(1, 1);
+        texture.at(u, v)
     });
 }

@@ -50,6 +50,15 @@ pub enum Dropped {
     OutOfRange,
 }
 
+/// Which way a run of pixels goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// Down a column.
+    Down,
+    /// To the right along a row.
+    Right,
+}
+
 /// Inside pixels without a gap, in one line: a column from [`columns`], a row from [`rows`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run {
@@ -182,6 +191,21 @@ pub fn columns(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Re
 /// A polygon outside the legal range; nothing of it was given to `sink`.
 pub fn rows(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Result<(), Dropped> {
     scan(polygon, &ROWS, sink)
+}
+
+/// [`columns`] or [`rows`].
+///
+/// # Errors
+/// As they have.
+pub fn runs(
+    axis: Axis,
+    polygon: &[impl Copy + Into<Point>],
+    sink: impl FnMut(Run),
+) -> Result<(), Dropped> {
+    match axis {
+        Axis::Down => columns(polygon, sink),
+        Axis::Right => rows(polygon, sink),
+    }
 }
 
 #[inline]

@@ -12,44 +12,8 @@
 
 use modex::Column;
 
-use crate::plane::texel;
-use crate::{Plane, Texture};
-
-/// The three forms of a plane down a column.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Walk {
-    /// a, b and c at the first pixel's centre.
-    pub at: [i64; 3],
-    /// Their steps from a pixel to the one below.
-    pub down: [i64; 3],
-}
-
-impl Walk {
-    /// Down from pixel (x, y) of the screen.
-    pub fn new(plane: &Plane, x: u16, y: u16) -> Self {
-        let forms = [plane.a, plane.b, plane.c];
-        Self {
-            at: forms.map(|form| form.at(x, y)),
-            down: forms.map(|form| form.down),
-        }
-    }
-
-    /// The forms `rows` below the first pixel.
-    fn below(&self, rows: u16) -> [i64; 3] {
-        [0, 1, 2].map(|k| self.at[k] + self.down[k] * i64::from(rows))
-    }
-
-    /// The forms here; then it is a pixel further down.
-    fn next(&mut self) -> [i64; 3] {
-        let here = self.at;
-        // Past the column's end at most by one: a step is below 2^55.
-        *self = Self {
-            at: self.below(1),
-            ..*self
-        };
-        here
-    }
-}
+use crate::Texture;
+use crate::plane::{Walk, texel};
 
 /// Draws a column of `len` pixels.
 pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_>) {
@@ -57,7 +21,7 @@ pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_
     let (width, height) = (texture.width(), texture.height());
     let (w, h) = (i64::from(width), i64::from(height));
     let needs_no_clamp = |&row: &u16| {
-        let [a, b, c] = walk.below(row);
+        let [a, b, c] = walk.after(row);
         a >= 0 && b >= 0 && a < w * c && b < h * c
     };
     let first = (0..len).find(needs_no_clamp).unwrap_or(len);
@@ -66,14 +30,14 @@ pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_
 
     let clamped = |[a, b, c]: [i64; 3]| {
         let (u, v) = (texel(a, c, width), texel(b, c, height));
-        texels[usize::from(v) * usize::from(width) + usize::from(u)]
+        texels[usize::from(v) * usize::from(texture.pitch()) + usize::from(u)]
     };
     let (above, rest) = column.split(first);
     let (inside, below) = rest.split(end - first);
     above.fill(|| clamped(walk.next()));
     inside.fill(|| {
         let [a, b, c] = walk.next();
-        texels[(b / c) as usize * usize::from(width) + (a / c) as usize]
+        texels[(b / c) as usize * usize::from(texture.pitch()) + (a / c) as usize]
     });
     below.fill(|| clamped(walk.next()));
 }

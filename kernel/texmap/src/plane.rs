@@ -28,6 +28,8 @@
 
 use modex::{HEIGHT, WIDTH};
 
+use crate::coverage::Axis;
+
 /// Furthest coordinate of a point, either sign: 256 units in 16.16.
 pub const MAX_POSITION: i32 = 1 << 24;
 /// Largest focal length in pixels.
@@ -78,6 +80,42 @@ pub struct Plane {
     pub b: Form,
     /// Their denominator; above zero where the plane lies before the eye.
     pub c: Form,
+}
+
+/// The three forms of a plane along a run of pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Walk {
+    /// a, b and c at the first pixel's centre.
+    pub at: [i64; 3],
+    /// Their steps from a pixel to the next.
+    pub step: [i64; 3],
+}
+
+impl Walk {
+    /// Along `axis` from pixel (x, y) of the screen.
+    pub fn new(plane: &Plane, axis: Axis, x: u16, y: u16) -> Self {
+        let forms = [plane.a, plane.b, plane.c];
+        Self {
+            at: forms.map(|form| form.at(x, y)),
+            step: forms.map(|form| match axis {
+                Axis::Down => form.down,
+                Axis::Right => form.right,
+            }),
+        }
+    }
+
+    /// The forms `pixels` after the first.
+    pub fn after(&self, pixels: u16) -> [i64; 3] {
+        [0, 1, 2].map(|k| self.at[k] + self.step[k] * i64::from(pixels))
+    }
+
+    /// The forms here; then it is a pixel further.
+    pub(crate) fn next(&mut self) -> [i64; 3] {
+        let here = self.at;
+        // Past the run's end at most by one: a step is below 2^55.
+        self.at = self.after(1);
+        here
+    }
 }
 
 /// A form before it is cut: at pixel (0, 0), and the steps to the right and down.
@@ -135,6 +173,19 @@ pub fn texel(n: i64, c: i64, size: u16) -> u16 {
         (size - 1) as u16
     } else {
         (n / c) as u16
+    }
+}
+
+/// The coordinate n / c in a texture of `size` texels, 16.16 and rounded down, inside the texture as
+/// [`texel`] is.
+pub fn coordinate(n: i64, c: i64, size: u16) -> i32 {
+    let last = (i64::from(size) << 16) - 1;
+    if n < 0 {
+        0
+    } else if n >= i64::from(size) * c {
+        last as i32
+    } else {
+        ((i128::from(n) << 16) / i128::from(c)) as i32
     }
 }
 

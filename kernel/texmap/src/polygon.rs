@@ -42,11 +42,15 @@ pub struct Vertex {
 }
 
 /// A rectangle of texels, row by row. Texel (i, j) covers [i, i + 1) x [j, j + 1).
+///
+/// The rows lie `pitch` texels apart. In a *padded* texture the pitch and the number of rows are
+/// powers of two: an index put together from masked coordinates can't leave it.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     texels: &'a [u8],
     width: u16,
     height: u16,
+    pitch: u16,
 }
 
 /// Why a texture can't be one.
@@ -59,9 +63,9 @@ pub enum TextureError {
         /// Texels down.
         height: u16,
     },
-    /// The slice does not hold width x height texels.
+    /// The slice does not hold as many texels.
     Length {
-        /// width x height.
+        /// What the texture has.
         expected: usize,
         /// The slice's length.
         actual: usize,
@@ -94,6 +98,7 @@ impl<'a> Texture<'a> {
         texels: &[0],
         width: 1,
         height: 1,
+        pitch: 1,
     };
 
     /// A texture of `width` x `height` texels.
@@ -101,11 +106,37 @@ impl<'a> Texture<'a> {
     /// # Errors
     /// A side outside 1 to 256, or a slice of another length.
     pub fn new(texels: &'a [u8], width: u16, height: u16) -> Result<Self, TextureError> {
+        Self::with_rows(texels, width, height, width, height)
+    }
+
+    /// A padded texture of `width` x `height` texels: `texels` has [`Texture::padded_len`] of them,
+    /// in rows of the next power of two. What lies beyond `width` or `height` is never drawn.
+    ///
+    /// # Errors
+    /// A side outside 1 to 256, or a slice of another length.
+    pub fn padded(texels: &'a [u8], width: u16, height: u16) -> Result<Self, TextureError> {
+        let [pitch, rows] = [width, height].map(|k| k.min(Self::MAX_SIDE).next_power_of_two());
+        Self::with_rows(texels, width, height, pitch, rows)
+    }
+
+    /// Texels of a padded texture.
+    pub fn padded_len(width: u16, height: u16) -> usize {
+        let [pitch, rows] = [width, height].map(|k| usize::from(k).next_power_of_two());
+        pitch * rows
+    }
+
+    fn with_rows(
+        texels: &'a [u8],
+        width: u16,
+        height: u16,
+        pitch: u16,
+        rows: u16,
+    ) -> Result<Self, TextureError> {
         let sides = 1..=Self::MAX_SIDE;
         if !sides.contains(&width) || !sides.contains(&height) {
             return Err(TextureError::Size { width, height });
         }
-        let (expected, actual) = (usize::from(width) * usize::from(height), texels.len());
+        let (expected, actual) = (usize::from(pitch) * usize::from(rows), texels.len());
         if expected != actual {
             return Err(TextureError::Length { expected, actual });
         }
@@ -113,10 +144,28 @@ impl<'a> Texture<'a> {
             texels,
             width,
             height,
+            pitch,
         })
     }
 
-    /// The texels, row by row.
+    /// Texels from a row to the next.
+    pub fn pitch(&self) -> u16 {
+        self.pitch
+    }
+
+    /// In a padded texture, the bits of a column's number and of a row's.
+    pub fn bits(&self) -> Option<(u32, u32)> {
+        let rows = self.texels.len() / usize::from(self.pitch);
+        let powers = self.pitch.is_power_of_two() && rows.is_power_of_two();
+        powers.then(|| (self.pitch.trailing_zeros(), rows.trailing_zeros()))
+    }
+
+    /// The texel at coordinates inside the texture, 16.16.
+    pub fn at(&self, u: i32, v: i32) -> u8 {
+        self.texels[(v >> 16) as usize * usize::from(self.pitch) + (u >> 16) as usize]
+    }
+
+    /// The texels, row by row, `pitch` apart.
     pub fn texels(&self) -> &'a [u8] {
         self.texels
     }

@@ -1,17 +1,18 @@
-//! From polygons to pixels: jobs are collected and drawn in polygon order.
+//! From polygons to pixels: jobs are collected, then drawn.
+
+use core::fmt;
 
 use modex::Destination;
 
-use crate::affine::Sides;
-use crate::coverage::{Run, columns};
-use crate::{ColumnJob, JobList, Plane, Texture, Vertex, Walk, affine, exact};
+use crate::mapper::{Face, Mapper};
+use crate::{JobList, Texture};
 
 /// What was drawn, and what was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stats {
     /// Polygons that were drawn (also those that cover no pixel).
     pub polygons: u32,
-    /// Columns drawn.
+    /// Runs drawn: columns, with most mappers.
     pub columns: u32,
     /// Pixels drawn.
     pub pixels: u32,
@@ -21,15 +22,43 @@ pub struct Stats {
     pub full: u32,
 }
 
-/// How a polygon's texture coordinates are found.
-#[derive(Clone, Copy, Debug)]
-pub enum Mapping<'a> {
-    /// Affine, from the vertices' own: [`Sides::walk`].
-    Affine,
-    /// Affine by chapter 57's half steps: [`Sides::half_step`].
-    HalfStep,
-    /// With the perspective of the texture's plane: [`exact`].
-    Exact(&'a Plane),
+/// In which order jobs are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// As the polygons come, a plane selected for each column.
+    #[default]
+    Polygons,
+    /// All of plane 0, then of 1, 2 and 3: a plane is selected four times a list.
+    Planes,
+}
+
+impl Order {
+    /// Every order with its name and a line for people.
+    pub const ALL: [(&'static str, Self, &'static str); 2] = [
+        (
+            "polygons",
+            Self::Polygons,
+            "as the polygons come, Map Mask once for each column",
+        ),
+        (
+            "planes",
+            Self::Planes,
+            "plane by plane, Map Mask four times for a picture",
+        ),
+    ];
+
+    /// The order of a name.
+    pub fn parse(name: &str) -> Option<Self> {
+        let named = Self::ALL.iter().find(|(known, ..)| *known == name);
+        named.map(|&(_, order, _)| order)
+    }
+}
+
+impl fmt::Display for Order {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = Self::ALL.iter().find(|(_, order, _)| order == self);
+        f.write_str(named.map_or("unnamed", |(name, ..)| name))
+    }
 }
 
 /// Draws polygons on a destination through a bounded list of jobs.
@@ -38,6 +67,8 @@ pub struct Renderer<'a, D, const N: usize> {
     jobs: &'a mut JobList<N>,
     textures: &'a [Texture<'a>],
     destination: &'a mut D,
+    mapper: Mapper,
+    order: Order,
     stats: Stats,
 }
 
@@ -47,88 +78,91 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
         jobs: &'a mut JobList<N>,
         textures: &'a [Texture<'a>],
         destination: &'a mut D,
+        mapper: Mapper,
+        order: Order,
     ) -> Self {
         jobs.clear();
         Self {
             jobs,
             textures,
             destination,
+            mapper,
+            order,
             stats: Stats::default(),
         }
     }
 
-    /// Adds a polygon with the texture `textures[texture]`.
+    /// Adds a face with the texture `textures[face.texture]`.
     ///
     /// # Panics
     /// If there is no such texture.
-    pub fn polygon(&mut self, polygon: &[Vertex], texture: u16, mapping: Mapping<'_>) {
-        let Self {
-            jobs,
-            textures,
-            destination,
-            stats,
-        } = self;
-        let mut add = |run: Run, walk| {
-            let job = ColumnJob {
-                x: run.line,
-                y: run.first,
-                len: run.len,
-                texture,
-                walk,
-            };
-            if let Err(job) = jobs.push(job) {
-                stats.full += 1;
-                draw(jobs, textures, *destination, stats);
+    pub fn face(&mut self, face: &Face<'_>) {
+        let texture = &self.textures[usize::from(face.texture)];
+        let mapped = self.mapper.jobs(face, texture, |job| {
+            self.stats.columns += 1;
+            self.stats.pixels += u32::from(job.len);
+            if let Err(job) = self.jobs.push(job) {
+                self.stats.full += 1;
+                draw(
+                    self.jobs,
+                    self.textures,
+                    self.destination,
+                    self.mapper,
+                    self.order,
+                );
                 // A list that was just emptied takes the job: N is not zero.
-                let _ = jobs.push(job);
+                let _ = self.jobs.push(job);
             }
-        };
-        let sides = || Sides::new(polygon, &textures[usize::from(texture)]);
-        let scanned = match mapping {
-            Mapping::Affine => sides()
-                .and_then(|sides| columns(polygon, |run| add(run, Walk::Affine(sides.walk(&run))))),
-            Mapping::HalfStep => sides().and_then(|sides| {
-                columns(polygon, |run| add(run, Walk::Affine(sides.half_step(&run))))
-            }),
-            Mapping::Exact(plane) => columns(polygon, |run| {
-                let walk = exact::Walk::new(plane, run.line, run.first);
-                add(run, Walk::Exact(walk));
-            }),
-        };
-        match scanned {
-            Ok(()) => stats.polygons += 1,
-            Err(_) => stats.dropped += 1,
+        });
+        match mapped {
+            Ok(()) => self.stats.polygons += 1,
+            Err(_) => self.stats.dropped += 1,
         }
     }
 
-    /// Counts a polygon that could not even be placed on the screen.
-    pub fn drop_polygon(&mut self) {
+    /// Counts a face that could not even be placed on the screen.
+    pub fn drop_face(&mut self) {
         self.stats.dropped += 1;
     }
 
     /// Draws what is left and says what the picture took.
-    pub fn finish(mut self) -> Stats {
-        draw(self.jobs, self.textures, self.destination, &mut self.stats);
+    pub fn finish(self) -> Stats {
+        draw(
+            self.jobs,
+            self.textures,
+            self.destination,
+            self.mapper,
+            self.order,
+        );
         self.stats
     }
 }
 
-/// Draws the jobs in their order and empties the list.
+/// Draws the jobs and empties the list.
 fn draw<D: Destination, const N: usize>(
     jobs: &mut JobList<N>,
     textures: &[Texture<'_>],
     destination: &mut D,
-    stats: &mut Stats,
+    mapper: Mapper,
+    order: Order,
 ) {
     const { assert!(N > 0, "a job list needs room for a job") };
-    for job in jobs.jobs() {
-        stats.columns += 1;
-        stats.pixels += u32::from(job.len);
-        let texture = &textures[usize::from(job.texture)];
-        destination.column(job.x, job.y, job.len, |column| match &job.walk {
-            Walk::Affine(walk) => affine::column(texture, walk, column),
-            Walk::Exact(walk) => exact::column(texture, *walk, job.len, column),
-        });
+    let style = mapper.style();
+    match order {
+        Order::Polygons => {
+            for job in jobs.jobs() {
+                job.draw(style, &textures[usize::from(job.texture)], destination);
+            }
+        }
+        Order::Planes => {
+            for plane in 0..4 {
+                destination.select(plane);
+                for job in jobs.jobs() {
+                    let texture = &textures[usize::from(job.texture)];
+                    job.draw_in_plane(plane, style, texture, destination);
+                }
+            }
+        }
     }
     jobs.clear();
 }

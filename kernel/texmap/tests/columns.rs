@@ -4,14 +4,14 @@
 use std::collections::HashMap;
 
 use texmap::affine::{Sides, Walk};
-use texmap::coverage::{self, Dropped, Run};
+use texmap::coverage::{self, Axis, Dropped, Run};
 use texmap::{Texture, Vertex};
 
 /// How the walk down a run is made.
 type Rule = fn(&Sides, &Run) -> Walk;
 
 fn walks(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Run, Walk)> {
-    let sides = Sides::new(polygon, texture).expect("legal polygon");
+    let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
     let mut walks = Vec::new();
     coverage::columns(polygon, |run| walks.push((run, rule(&sides, &run)))).unwrap();
     walks
@@ -91,7 +91,7 @@ fn a_coordinate_at_the_textures_border_is_drawn_and_one_beyond_is_not() {
     };
     assert!(!drawn(&triangle(u, v), &texture, Sides::walk).is_empty());
     for (u, v) in [(u + 1, v), (u, v + 1), (-1, v), (u, -1)] {
-        let refused = Sides::new(&triangle(u, v), &texture).map(|_| ());
+        let refused = Sides::new(&triangle(u, v), &texture, Axis::Down).map(|_| ());
         assert_eq!(refused, Err(Dropped::OutOfRange), "{u} {v}");
     }
 }

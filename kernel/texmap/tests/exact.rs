@@ -3,7 +3,8 @@
 
 use modex::{Destination, PlanarBuffer};
 use oracle::texel::perspective;
-use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING};
+use texmap::coverage::Axis;
+use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING, Walk};
 use texmap::{Texture, exact};
 
 const FOCAL_LENGTH: i32 = 258;
@@ -97,7 +98,7 @@ impl Axes {
     ) -> [Vec<u8>; 2] {
         [&self.texels[0], &self.texels[1]].map(|texels| {
             let texture = Texture::new(texels, self.size.0, self.size.1).unwrap();
-            let walk = exact::Walk::new(plane, x, y);
+            let walk = Walk::new(plane, Axis::Down, x, y);
             page.column(x, y, len, |column| {
                 exact::column(&texture, walk, len, column)
             });

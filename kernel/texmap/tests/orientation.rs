@@ -4,8 +4,8 @@
 //! side does not turn along.
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
-use texmap::plane::{Anchor, Plane};
-use texmap::{JobList, Mapping, Renderer, SUBPIXELS, Texture, Vertex};
+use texmap::plane::Anchor;
+use texmap::{Face, JobList, Mapper, Order, Renderer, SUBPIXELS, Texture, Vertex};
 
 /// The middle of the screen in 1/256 pixel, about which everything turns.
 const MIDDLE: (i32, i32) = (160 * SUBPIXELS, 120 * SUBPIXELS);
@@ -35,7 +35,7 @@ type Corners = [Place; 4];
 const COORDINATES: [(i32, i32); 4] = [(0, 0), (1, 0), (1, 1), (0, 1)];
 
 /// Draws the parallelogram; 0 where nothing is drawn.
-fn draw(corners: &Corners, by: By) -> PlanarBuffer {
+fn draw(corners: &Corners, by: Mapper) -> PlanarBuffer {
     // No two neighbours of a texel, nor itself turned, are like it.
     let texels: Vec<u8> = (0..SIDE * SIDE).map(|i| (i % 251 + 1) as u8).collect();
     let texture = Texture::new(&texels, SIDE, SIDE).unwrap();
@@ -53,26 +53,18 @@ fn draw(corners: &Corners, by: By) -> PlanarBuffer {
         let (x, y) = (MIDDLE.0 + corners[i].0, MIDDLE.1 + corners[i].1);
         Vertex { x, y, u, v }
     });
-    let plane = Plane::new(&anchors, FOCAL_LENGTH);
     let mut page = PlanarBuffer::new();
     let mut jobs = JobList::<64>::new();
     let textures = [texture];
-    let mut renderer = Renderer::new(&mut jobs, &textures, &mut page);
-    let mapping = match by {
-        By::Affine => Mapping::Affine,
-        By::HalfStep => Mapping::HalfStep,
-        By::Exact => Mapping::Exact(&plane),
-    };
-    renderer.polygon(&polygon, 0, mapping);
+    let mut renderer = Renderer::new(&mut jobs, &textures, &mut page, by, Order::default());
+    renderer.face(&Face {
+        polygon: &polygon,
+        texture: 0,
+        anchors,
+        focal_length: FOCAL_LENGTH,
+    });
     assert_eq!(renderer.finish().dropped, 0);
     page
-}
-
-#[derive(Clone, Copy, Debug)]
-enum By {
-    Affine,
-    HalfStep,
-    Exact,
 }
 
 /// Whether a pixel's centre lies on an edge, or on a border between texels. All at one depth, the
@@ -90,7 +82,7 @@ fn on_a_border(corners: &Corners, centre: Place) -> bool {
 
 /// Pixels, those of them that are other ones when turned though no border is near, and those on a
 /// border.
-fn compare(by: By, cases: usize) -> [u32; 3] {
+fn compare(by: Mapper, cases: usize) -> [u32; 3] {
     let seed = fastrand::u64(..);
     println!("seed {seed}");
     let mut random = fastrand::Rng::with_seed(seed);
@@ -135,7 +127,7 @@ fn compare(by: By, cases: usize) -> [u32; 3] {
                 }
                 others += 1;
                 assert!(
-                    !matches!(by, By::Exact),
+                    by != Mapper::Exact,
                     "({x}, {y}) turned {name}: {before} became {after}; {corners:?}"
                 );
             }
@@ -147,7 +139,7 @@ fn compare(by: By, cases: usize) -> [u32; 3] {
 
 #[test]
 fn a_turned_polygon_gives_the_turned_picture() {
-    let [pixels, others, ties] = compare(By::Exact, 150);
+    let [pixels, others, ties] = compare(Mapper::Exact, 150);
     assert!(pixels > 500_000 && ties > 100);
     assert_eq!(others, 0);
 }
@@ -155,7 +147,7 @@ fn a_turned_polygon_gives_the_turned_picture() {
 /// Steps are cut towards zero, so a walk the other way is off the other way: by 2^-8 texel at most.
 #[test]
 fn affine_columns_shift_a_texture_by_next_to_nothing() {
-    let [pixels, others, _] = compare(By::Affine, 150);
+    let [pixels, others, _] = compare(Mapper::default(), 150);
     assert!(others * 500 < pixels, "{others} of {pixels}");
 }
 
@@ -163,6 +155,6 @@ fn affine_columns_shift_a_texture_by_next_to_nothing() {
 /// shares coordinates out over whole pixels.
 #[test]
 fn half_steps_shift_a_texture_much_more() {
-    let [pixels, others, _] = compare(By::HalfStep, 150);
+    let [pixels, others, _] = compare(Mapper::HalfStep, 150);
     assert!(others * 50 > pixels, "{others} of {pixels}");
 }

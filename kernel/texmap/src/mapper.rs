@@ -1,0 +1,243 @@
+//! Every way to map a texture, by name, and the jobs that it makes of a face.
+
+use core::fmt;
+
+use crate::affine::{self, Sides};
+use crate::coverage::{Axis, Dropped, Run, runs};
+use crate::job::{Job, Rows, Style, Walk};
+use crate::loops::Loop;
+use crate::plane::{self, Anchor, Plane};
+use crate::runs::Pieces;
+use crate::{Texture, Vertex};
+
+/// A face on the screen, as the mappers need it.
+#[derive(Clone, Copy, Debug)]
+pub struct Face<'p> {
+    /// Its snapped corners.
+    pub polygon: &'p [Vertex],
+    /// Which of the scene's textures.
+    pub texture: u16,
+    /// Three points of the texture's plane.
+    pub anchors: [Anchor; 3],
+    /// The focal length in pixels.
+    pub focal_length: i32,
+}
+
+impl Face<'_> {
+    /// The texture's plane.
+    pub fn plane(&self) -> Plane {
+        Plane::new(&self.anchors, self.focal_length)
+    }
+}
+
+/// A way to map a texture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mapper {
+    /// Affine rows, by chapter 57's half steps.
+    Rows(Rows),
+    /// Affine columns, interpolated exactly between the polygon's sides.
+    Affine(Loop),
+    /// Affine columns by chapter 57's half steps.
+    HalfStep,
+    /// A quotient for every pixel.
+    Exact,
+    /// Affine from exact ends, linear pieces in each column.
+    Linear(Pieces),
+    /// Quadratic pieces in each column.
+    Quadratic(Pieces),
+}
+
+/// A mapper's name, the mapper, and a line about it.
+type Named = (&'static str, Mapper, &'static str);
+
+impl Mapper {
+    /// Every mapper with its name and a line for people, from the seeds' first to the exact.
+    pub const ALL: &'static [Named] = &[
+        (
+            "row-multiply",
+            Self::Rows(Rows::Multiply),
+            "rows, half steps; plane, address and texel anew for every pixel (chapter 57's first)",
+        ),
+        (
+            "row-steps",
+            Self::Rows(Rows::Steps),
+            "rows, half steps; all of it stepped, Map Mask rotated (chapter 57's second)",
+        ),
+        (
+            "row-passes",
+            Self::Rows(Rows::Passes),
+            "rows, half steps; four passes, one a plane (what chapter 58 turned down)",
+        ),
+        (
+            "half-step",
+            Self::HalfStep,
+            "columns by chapter 57's half steps",
+        ),
+        (
+            "affine",
+            Self::Affine(Loop::Multiply),
+            "columns; the texel's index multiplied out: the clear twin of the next seven",
+        ),
+        (
+            "two-carries",
+            Self::Affine(Loop::TwoCarries),
+            "columns; two fractions, each carry tested (chapter 58's first)",
+        ),
+        (
+            "packed",
+            Self::Affine(Loop::Packed),
+            "columns; both fractions in one register, one branch (chapter 58's last)",
+        ),
+        (
+            "two-steps",
+            Self::Affine(Loop::TwoSteps),
+            "columns; the carry picks one of two steps, no branch (John Miles)",
+        ),
+        (
+            "shifts",
+            Self::Affine(Loop::Shifts),
+            "columns; two accumulators, shifts and masks",
+        ),
+        (
+            "joined",
+            Self::Affine(Loop::Joined),
+            "columns; one accumulator, shifts and masks",
+        ),
+        (
+            "add-carry",
+            Self::Affine(Loop::AddCarry),
+            "columns; each register keeps the other's fraction, add-with-carry",
+        ),
+        (
+            "extract",
+            Self::Affine(Loop::Extract),
+            "columns; one accumulator, the index by the CPU's bit-extract",
+        ),
+        (
+            "linear-4",
+            Self::Linear(Pieces::Of(4)),
+            "perspective; a quotient every 4 pixels, linear between",
+        ),
+        (
+            "linear-8",
+            Self::Linear(Pieces::Of(8)),
+            "perspective; a quotient every 8 pixels, linear between",
+        ),
+        (
+            "linear-16",
+            Self::Linear(Pieces::Of(16)),
+            "perspective; a quotient every 16 pixels, linear between",
+        ),
+        (
+            "linear-32",
+            Self::Linear(Pieces::Of(32)),
+            "perspective; a quotient every 32 pixels, linear between",
+        ),
+        (
+            "linear-powers",
+            Self::Linear(Pieces::Powers),
+            "perspective; linear in pieces of powers of two, a shift in place of each division",
+        ),
+        (
+            "quadratic-16",
+            Self::Quadratic(Pieces::Of(16)),
+            "perspective; quadratic through three quotients every 16 pixels",
+        ),
+        (
+            "quadratic-32",
+            Self::Quadratic(Pieces::Of(32)),
+            "perspective; quadratic through three quotients every 32 pixels",
+        ),
+        (
+            "quadratic",
+            Self::Quadratic(Pieces::Whole),
+            "perspective; quadratic through three quotients of each column",
+        ),
+        (
+            "exact",
+            Self::Exact,
+            "perspective; a quotient for every pixel, rounded nowhere",
+        ),
+    ];
+
+    /// The mapper of a name.
+    pub fn parse(name: &str) -> Option<Self> {
+        let named = Self::ALL.iter().find(|(known, ..)| *known == name);
+        named.map(|&(_, mapper, _)| mapper)
+    }
+
+    /// How its runs are drawn.
+    pub fn style(self) -> Style {
+        let mut style = Style::default();
+        match self {
+            Self::Rows(rows) => style.rows = rows,
+            Self::Affine(affine) => style.affine = affine,
+            _ => {}
+        }
+        style
+    }
+
+    /// Gives `sink` the jobs that draw a face with `texture`.
+    ///
+    /// # Errors
+    /// A polygon outside the legal range; nothing of it was given to `sink`.
+    pub fn jobs(
+        self,
+        face: &Face<'_>,
+        texture: &Texture<'_>,
+        mut sink: impl FnMut(Job),
+    ) -> Result<(), Dropped> {
+        let number = face.texture;
+        let mut add = |axis, run: &Run, walk| {
+            let (x, y) = match axis {
+                Axis::Down => (run.line, run.first),
+                Axis::Right => (run.first, run.line),
+            };
+            sink(Job {
+                axis,
+                x,
+                y,
+                len: run.len,
+                texture: number,
+                walk,
+            });
+        };
+        let polygon = face.polygon;
+        let mut by_sides = |axis, rule: fn(&Sides, &Run) -> affine::Walk| {
+            let sides = Sides::new(polygon, texture, axis)?;
+            runs(axis, polygon, |run| {
+                add(axis, &run, Walk::Affine(rule(&sides, &run)));
+            })
+        };
+        match self {
+            Self::Rows(_) => return by_sides(Axis::Right, Sides::half_step),
+            Self::Affine(_) => return by_sides(Axis::Down, Sides::walk),
+            Self::HalfStep => return by_sides(Axis::Down, Sides::half_step),
+            _ => {}
+        }
+        let plane = face.plane();
+        runs(Axis::Down, polygon, |run| {
+            let walk = plane::Walk::new(&plane, Axis::Down, run.line, run.first);
+            let walk = match self {
+                Self::Linear(pieces) => Walk::Linear(walk, pieces),
+                Self::Quadratic(pieces) => Walk::Quadratic(walk, pieces),
+                _ => Walk::Exact(walk),
+            };
+            add(Axis::Down, &run, walk);
+        })
+    }
+}
+
+/// What the measurements recommend in QEMU.
+impl Default for Mapper {
+    fn default() -> Self {
+        Self::Affine(Loop::default())
+    }
+}
+
+impl fmt::Display for Mapper {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let named = Self::ALL.iter().find(|(_, mapper, _)| mapper == self);
+        f.write_str(named.map_or("unnamed", |(name, ..)| name))
+    }
+}
