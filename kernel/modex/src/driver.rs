@@ -4,7 +4,8 @@ use core::fmt;
 
 use crate::registers::*;
 use crate::{
-    Bus, Destination, HEIGHT, Lane, PAGE_BYTES, PAGES, PLANE_BYTES, Purpose, STRIDE, WIDTH,
+    Bus, Destination, HEIGHT, Lane, Offscreen, PAGE_BYTES, PAGES, PLANE_BYTES, Purpose, STRIDE,
+    WIDTH,
 };
 
 /// A colour of the DAC: red, green, blue, 0 to 63 each.
@@ -51,27 +52,57 @@ impl fmt::Display for Readback {
 /// What a page was drawn on since it last held the bare background: for each group of 32
 /// pixel columns the lines `top..bottom`.
 #[derive(Clone, Copy, Debug)]
-struct Drawn {
+pub(crate) struct Drawn {
     top: [u16; GROUPS],
     bottom: [u16; GROUPS],
 }
 
 impl Drawn {
-    const NOTHING: Self = Self {
+    pub(crate) const NOTHING: Self = Self {
         top: [HEIGHT as u16; GROUPS],
         bottom: [0; GROUPS],
     };
-    const EVERYTHING: Self = Self {
+    pub(crate) const EVERYTHING: Self = Self {
         top: [0; GROUPS],
         bottom: [HEIGHT as u16; GROUPS],
     };
 
-    /// The pixel columns `first..=last`, lines `top..bottom`.
+    /// Adds a lane of `len` pixels from (x, y) on.
+    ///
+    /// # Panics
+    /// If it leaves the picture.
+    pub(crate) fn lane<const STEP: usize>(&mut self, x: u16, y: u16, len: u16) {
+        let (last, bottom) = check_lane::<STEP>(x, y, len);
+        self.add(x, last, y, bottom);
+    }
+
+    /// Adds the pixel columns `first..=last`, lines `top..bottom`.
     fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
         for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
             self.top[group] = self.top[group].min(top);
             self.bottom[group] = self.bottom[group].max(bottom);
         }
+    }
+}
+
+impl Drawn {
+    /// What either was drawn on.
+    fn or(&self, other: &Self) -> Self {
+        let mut both = *self;
+        for group in 0..GROUPS {
+            both.top[group] = both.top[group].min(other.top[group]);
+            both.bottom[group] = both.bottom[group].max(other.bottom[group]);
+        }
+        both
+    }
+
+    /// The groups of 8 bytes drawn on, counted from the page's start, each with its line.
+    pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, usize)> {
+        let lines = self.top.into_iter().zip(self.bottom);
+        lines.enumerate().flat_map(|(group, (top, bottom))| {
+            let lines = usize::from(top)..usize::from(bottom);
+            lines.map(move |y| (y * GROUPS + group, y))
+        })
     }
 }
 
@@ -143,19 +174,14 @@ impl<B: Bus> ModeX<B> {
     ///
     /// Only what the page was drawn on is restored, in wide stores to all planes at once.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) -> Canvas<'_, B> {
-        self.back = (self.back + 1) % PAGES;
-        if self.visible[self.back] {
-            self.settle();
-        }
+        self.turn();
         self.bus.purpose(Purpose::Erase);
         write(&mut self.bus, SEQUENCER, MAP_MASK, ALL_PLANES);
         let drawn = core::mem::replace(&mut self.drawn[self.back], Drawn::NOTHING);
-        for group in 0..GROUPS {
-            for y in drawn.top[group]..drawn.bottom[group] {
-                let at = page_start(self.back) + usize::from(y) * STRIDE + group * GROUP_BYTES;
-                let colour = background[usize::from(y)];
-                self.bus.store64(at as u16, u64::from_ne_bytes([colour; 8]));
-            }
+        for (group, y) in drawn.groups() {
+            let at = page_start(self.back) + group * GROUP_BYTES;
+            let colour = background[y];
+            self.bus.store64(at as u16, u64::from_ne_bytes([colour; 8]));
         }
         self.bus.purpose(Purpose::Draw);
         Canvas {
@@ -163,6 +189,33 @@ impl<B: Bus> ModeX<B> {
             drawn: &mut self.drawn[self.back],
             bus: &mut self.bus,
         }
+    }
+
+    /// Takes the page after the one drawn last, once it can't be on the screen any more.
+    fn turn(&mut self) {
+        self.back = (self.back + 1) % PAGES;
+        if self.visible[self.back] {
+            self.settle();
+        }
+    }
+
+    /// Has the page after the one drawn last hold what `offscreen` holds, both on the same
+    /// background: stores what either was drawn on, eight bytes at once, plane by plane. Waits as
+    /// [`ModeX::begin`] does.
+    pub fn present(&mut self, offscreen: &Offscreen) {
+        self.turn();
+        self.bus.purpose(Purpose::Draw);
+        let drawn = offscreen.drawn().or(&self.drawn[self.back]);
+        for (plane, bytes) in (0..).zip(&offscreen.page().planes) {
+            write(&mut self.bus, SEQUENCER, MAP_MASK, 1 << plane);
+            let (groups, _) = bytes.as_chunks();
+            for (group, _) in drawn.groups() {
+                let at = page_start(self.back) + group * GROUP_BYTES;
+                self.bus
+                    .store64(at as u16, u64::from_ne_bytes(groups[group]));
+            }
+        }
+        self.drawn[self.back] = *offscreen.drawn();
     }
 
     /// Shows the page drawn last, from the next retrace on.
@@ -268,8 +321,7 @@ impl<B: Bus> Destination for Canvas<'_, B> {
         len: u16,
         draw: impl FnOnce(Lane<'_, STEP>),
     ) {
-        let (last, bottom) = check_lane::<STEP>(x, y, len);
-        self.drawn.add(x, last, y, bottom);
+        self.drawn.lane::<STEP>(x, y, len);
         let at = self.page_start + usize::from(y) * STRIDE + usize::from(x) / 4;
         self.bus.lane(at as u16, len, draw);
     }

@@ -18,13 +18,15 @@
 //!   safe on every card.
 //!
 //! [`Destination`] is the one contract by which a texture mapper reaches pixels; [`Canvas`]
-//! (a page of the card) and [`PlanarBuffer`] (the same shape in RAM) implement it.
+//! (a page of the card), [`PlanarBuffer`] (the same shape in RAM) and [`Offscreen`] (one that can be
+//! presented) implement it.
 #![no_std]
 
 mod bus;
 mod column;
 mod count;
 mod driver;
+mod offscreen;
 mod planar;
 pub mod registers;
 
@@ -32,6 +34,7 @@ pub use bus::{Bus, Purpose};
 pub use column::{Column, Destination, Lane};
 pub use count::{Counted, Counts, Tally};
 pub use driver::{Canvas, ModeX, Palette, Readback, Rgb6};
+pub use offscreen::Offscreen;
 pub use planar::PlanarBuffer;
 
 /// Pixels in a line.

@@ -1,0 +1,70 @@
+//! A page in RAM to draw on, and to present.
+
+use crate::driver::Drawn;
+use crate::{Destination, HEIGHT, Lane, PlanarBuffer};
+
+/// A page in RAM that knows what it was drawn on.
+///
+/// Drawn on in any order of planes it costs no port write; [`ModeX::present`] then stores it eight
+/// bytes at once, a plane after the other.
+///
+/// [`ModeX::present`]: crate::ModeX::present
+#[derive(Clone, Debug)]
+pub struct Offscreen {
+    page: PlanarBuffer,
+    drawn: Drawn,
+}
+
+impl Offscreen {
+    /// A page of zeros, on which no background counts as painted.
+    pub const fn new() -> Self {
+        Self {
+            page: PlanarBuffer::new(),
+            drawn: Drawn::EVERYTHING,
+        }
+    }
+
+    /// The page on its bare background: `background[y]` is the colour of line y. Only what was
+    /// drawn on is restored.
+    pub fn begin(&mut self, background: &[u8; HEIGHT]) {
+        let drawn = core::mem::replace(&mut self.drawn, Drawn::NOTHING);
+        for (group, y) in drawn.groups() {
+            for plane in &mut self.page.planes {
+                plane.as_chunks_mut().0[group] = [background[y]; 8];
+            }
+        }
+    }
+
+    /// The page.
+    pub fn page(&self) -> &PlanarBuffer {
+        &self.page
+    }
+
+    /// What it was drawn on since its background was bare.
+    pub(crate) fn drawn(&self) -> &Drawn {
+        &self.drawn
+    }
+}
+
+impl Default for Offscreen {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Destination for Offscreen {
+    fn select(&mut self, x: u16) {
+        self.page.select(x);
+    }
+
+    fn lane<const STEP: usize>(
+        &mut self,
+        x: u16,
+        y: u16,
+        len: u16,
+        draw: impl FnOnce(Lane<'_, STEP>),
+    ) {
+        self.drawn.lane::<STEP>(x, y, len);
+        self.page.lane(x, y, len, draw);
+    }
+}
