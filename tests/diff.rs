@@ -78,6 +78,7 @@ fn dump(content: Content) -> Dump {
         header: Header {
             content,
             scene: "ball".into(),
+            mapper: "exact".into(),
             picture: Some(Picture::Frame(480)),
             start: 0x4B00,
             width: 320,
@@ -288,10 +289,10 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         ),
         (
             "later",
-            good.replacen(lines[0], &framed("crystal-ball dump 2"), 1)
+            good.replacen(lines[0], &framed("crystal-ball dump 3"), 1)
                 .into(),
             [
-                "line 1: it is a dump of version 2; this program reads version 1",
+                "line 1: it is a dump of version 3; this program reads version 2",
                 "take the dump again",
             ],
         ),
@@ -303,12 +304,12 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         (
             "cut in a line",
             good[..99_999].into(),
-            ["line 171: it is cut short", "take the dump again"],
+            ["line 172: it is cut short", "take the dump again"],
         ),
         (
             "edited",
             good.replacen("line 007 e8", "line 007 e9", 1).into(),
-            ["line 30: ", "take the dump again"],
+            ["line 31: ", "take the dump again"],
         ),
         (
             "cut.png",

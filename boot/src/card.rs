@@ -9,11 +9,12 @@
 use anyhow::{anyhow, bail};
 use emulator::Vga;
 use link::dump::{Header, PLANE_BYTES};
-use link::{Command, Content, ERROR, OK, Picture};
+use link::{Command, Content, ERROR, OK, Picture, Setting};
 use show::{Memory, Show};
 
 use crate::dump::Dump;
 use crate::indexed::widen;
+use crate::look::Look;
 use crate::screen::Screen;
 
 /// A card with a show on it.
@@ -41,7 +42,18 @@ pub trait Card {
     /// # Errors
     /// As [`Card::ask`].
     fn show(&mut self, pictures: &[Picture]) -> anyhow::Result<()> {
+        self.show_as(&Look::default(), pictures)
+    }
+
+    /// The same, drawn in a certain way.
+    ///
+    /// # Errors
+    /// As [`Card::ask`].
+    fn show_as(&mut self, look: &Look, pictures: &[Picture]) -> anyhow::Result<()> {
         self.ask(Command::Hold)?;
+        for command in look.commands() {
+            self.ask(command)?;
+        }
         for &picture in pictures {
             self.ask(Command::Show(picture))?;
         }
@@ -54,6 +66,9 @@ pub trait Card {
 pub struct Emulated<'a> {
     show: Show<'a, Vga>,
     scene: String,
+    /// The mapper that is set, and the one that drew the picture.
+    mapper: String,
+    drawn_by: String,
     picture: Option<Picture>,
 }
 
@@ -66,13 +81,21 @@ impl<'a> Emulated<'a> {
         let mut this = Self {
             show: Show::new(memory, Vga::new()),
             scene: String::new(),
+            mapper: String::new(),
+            drawn_by: String::new(),
             picture: None,
         };
         this.ask(Command::Hold)?;
-        let state = this.ask(Command::State)?;
-        let scene = state.iter().find_map(|line| line.strip_prefix("scene "));
-        this.scene = scene.unwrap_or_default().to_string();
         Ok(this)
+    }
+
+    /// What the program says of its state in the line that begins with `what`.
+    fn state(&mut self, what: &str) -> anyhow::Result<String> {
+        let state = self.ask(Command::State)?;
+        let said = state
+            .iter()
+            .find_map(|line| line.strip_prefix(what)?.strip_prefix(' '));
+        Ok(said.unwrap_or_default().to_string())
     }
 
     /// The card itself.
@@ -95,13 +118,26 @@ impl Card for Emulated<'_> {
         if let Some(request) = request {
             bail!("the emulated card has no machine that could '{request:?}'");
         }
-        match command {
-            Command::Hold => self.picture = None,
-            Command::Show(picture) => self.picture = Some(picture),
-            _ => {}
-        }
         match answer.pop() {
-            Some(last) if last == format!("{OK} {command}") => Ok(answer),
+            Some(last) if last == format!("{OK} {command}") => {
+                match command {
+                    Command::Hold => {
+                        self.picture = None;
+                        self.scene = self.state("scene")?;
+                        self.mapper = self.state("mapper")?;
+                        if self.drawn_by.is_empty() {
+                            self.drawn_by.clone_from(&self.mapper);
+                        }
+                    }
+                    Command::Set(Setting::Mapper, Some(name)) => self.mapper = name.to_string(),
+                    Command::Show(picture) => {
+                        self.picture = Some(picture);
+                        self.drawn_by.clone_from(&self.mapper);
+                    }
+                    _ => {}
+                }
+                Ok(answer)
+            }
             Some(error) => {
                 let error = error.strip_prefix(ERROR).unwrap_or(&error);
                 Err(anyhow!("'{command}' is refused:{error}"))
@@ -123,6 +159,7 @@ impl Card for Emulated<'_> {
             header: Header {
                 content,
                 scene: self.scene.clone(),
+                mapper: self.drawn_by.clone(),
                 picture: self.picture,
                 start: page.start,
                 width: page.width.try_into()?,

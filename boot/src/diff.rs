@@ -327,6 +327,7 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
     };
     let fields = [
         ("scene", a.scene.clone(), b.scene.clone()),
+        ("mapper", a.mapper.clone(), b.mapper.clone()),
         ("picture", picture(a.picture), picture(b.picture)),
         (
             "start",
@@ -779,6 +780,7 @@ mod tests {
             header: Header {
                 content,
                 scene: "ball".into(),
+                mapper: "exact".into(),
                 picture: Some(Picture::Frame(480)),
                 start: 0x4B00,
                 width: 320,

@@ -261,6 +261,7 @@ impl<'a> Reader<'a> {
             other => return Err(format!("content is 'page' or 'memory', not '{other}'")),
         };
         let scene = self.line("scene")?.to_string();
+        let mapper = self.line("mapper")?.to_string();
         let picture = match self.line("picture")? {
             "none" => None,
             name => Some(
@@ -289,6 +290,7 @@ impl<'a> Reader<'a> {
         Ok(Header {
             content,
             scene,
+            mapper,
             picture,
             start: u16::from_be_bytes(start),
             width,

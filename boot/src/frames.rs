@@ -11,6 +11,7 @@ use clap::Args;
 use link::{Content, Picture};
 
 use crate::card::Card;
+use crate::look::Look;
 use crate::setup::Step;
 use crate::{aside, child};
 
@@ -96,7 +97,7 @@ impl Frames {
         (count, pictures)
     }
 
-    /// Has each picture shown by `card` and writes its dump and its PNG; `wrote` is told the path
+    /// Has each picture shown by `card`, drawn as `look` says, and writes its dump and its PNG; `wrote` is told the path
     /// of each.
     ///
     /// # Errors
@@ -104,6 +105,7 @@ impl Frames {
     pub fn write(
         &self,
         card: &mut impl Card,
+        look: &Look,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
     ) -> anyhow::Result<()> {
         std::fs::create_dir_all(&self.out)
@@ -119,7 +121,7 @@ impl Frames {
             if child::interrupted() {
                 return Err(child::Interrupted.into());
             }
-            card.show(&[picture])?;
+            card.show_as(look, &[picture])?;
             let dump = card.dump(content)?;
             let stem = self.out.join(stem(picture, content));
             let text = stem.with_added_extension("dump");

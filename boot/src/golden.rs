@@ -5,6 +5,7 @@
 //! ```toml
 //! about = "The ball from so near that each of the screen's edges cuts it."
 //! show = ["0", "pose 00000000 00000000 00000000 00013333"]
+//! mapper = "linear-16"      # may be left out, as may be `order`
 //! ```
 //!
 //! and `NAME.png`, the last of these pictures, indexed. They are found by folder, so none can be
@@ -23,11 +24,13 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 use link::{Command, Content, Picture};
 use serde::Deserialize;
+use texmap::{Mapper, Order};
 
 use crate::aside;
 use crate::card::{Card, Emulated};
 use crate::diff::{Difference, Subject, compare};
 use crate::indexed::Indexed;
+use crate::look::{Look, Named};
 use crate::machine::Machine;
 use crate::report::Report;
 use crate::screen::Screen;
@@ -42,6 +45,8 @@ pub struct Golden {
     pub about: String,
     /// The pictures that are shown, after `hold`; the golden is the last.
     pub show: Vec<Picture>,
+    /// How they are drawn.
+    pub look: Look,
     /// Its PNG.
     pub png: PathBuf,
 }
@@ -52,6 +57,8 @@ pub struct Golden {
 struct Description {
     about: String,
     show: Vec<String>,
+    mapper: Option<String>,
+    order: Option<String>,
 }
 
 /// The workspace's golden frames.
@@ -106,7 +113,21 @@ impl Golden {
         if show.is_empty() {
             return Err(anyhow::anyhow!("it shows nothing")).with_context(wrong);
         }
+        let unknown = |what, name| anyhow::anyhow!("there is no {what} '{name}'");
+        let look = Look {
+            mapper: (description.mapper)
+                .map(|name| Mapper::parse(&name).ok_or_else(|| unknown("mapper", name)))
+                .transpose()
+                .with_context(wrong)?
+                .map(Named),
+            order: (description.order)
+                .map(|name| Order::parse(&name).ok_or_else(|| unknown("order", name)))
+                .transpose()
+                .with_context(wrong)?
+                .map(Named),
+        };
         Ok(Self {
+            look,
             name: path
                 .file_stem()
                 .unwrap_or_default()
@@ -176,7 +197,7 @@ impl Findings {
         golden: &Golden,
         emulated: &mut Emulated<'_>,
     ) -> anyhow::Result<()> {
-        emulated.show(&golden.show)?;
+        emulated.show_as(&golden.look, &golden.show)?;
         let drawn = Subject::Dump(emulated.dump(Content::Page)?);
         match golden.picture() {
             Ok(Some(picture)) => {
@@ -208,8 +229,8 @@ impl Findings {
         machine: &mut Machine,
         transfer: Transfer,
     ) -> anyhow::Result<()> {
-        emulated.show(&golden.show)?;
-        machine.show(&golden.show)?;
+        emulated.show_as(&golden.look, &golden.show)?;
+        machine.show_as(&golden.look, &golden.show)?;
         // Between the answer and the next command, when the kernel touches no video memory.
         let screen = machine.screen()?;
         let expected = emulated.dump(Content::Page)?;
@@ -354,7 +375,7 @@ pub fn bless(
     let mut changes = Vec::new();
     let mut differ = Findings::default();
     for golden in find(folder)? {
-        emulated.show(&golden.show)?;
+        emulated.show_as(&golden.look, &golden.show)?;
         let drawn = emulated.dump(Content::Page)?;
         // What can't be read is blessed anew, as what is not there.
         let before = golden.picture().unwrap_or_default();

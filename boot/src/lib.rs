@@ -8,6 +8,7 @@ pub mod dump;
 pub mod frames;
 pub mod golden;
 pub mod indexed;
+pub mod look;
 pub mod machine;
 pub mod report;
 pub mod screen;

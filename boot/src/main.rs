@@ -13,6 +13,7 @@ use crystal_ball::card::{Card, Emulated};
 use crystal_ball::diff;
 use crystal_ball::frames::Frames;
 use crystal_ball::golden;
+use crystal_ball::look::Look;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child};
@@ -35,6 +36,8 @@ struct Cli {
     #[command(flatten)]
     boot: Boot,
     #[command(flatten)]
+    look: Look,
+    #[command(flatten)]
     tools: Tools,
     /// More arguments for QEMU, after `--`
     #[arg(last = true, value_name = "QEMU ARGUMENTS")]
@@ -46,6 +49,7 @@ Examples (`cargo run -- ` hands on what follows):
   cargo run                            boot and watch
   cargo run -- --headless              boot without a window, leave a picture
   cargo run -- --vga cirrus            on another display adapter
+  cargo run -- --mapper exact          with another mapper (--help lists them, -h does not)
   cargo run -- -- -machine q35 -m 64   with more arguments for QEMU
   cargo run -- doctor                  what is set up, and where
   cargo run -- diff A B                what differs in two dumps, PNGs or folders
@@ -188,12 +192,12 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
                 arguments: cli.qemu_arguments,
                 ..Config::new(&ready)
             })?;
-            frames.write(&mut machine, tell_path)?;
+            frames.write(&mut machine, &cli.look, tell_path)?;
             machine.leave()?;
         }
         Some(Subcommands::Emulate(frames)) => {
             let mut memory = Box::new(Memory::new());
-            frames.write(&mut Emulated::new(&mut memory)?, tell_path)?;
+            frames.write(&mut Emulated::new(&mut memory)?, &cli.look, tell_path)?;
         }
         Some(Subcommands::Diff { a, b, report }) => return compare(&a, &b, report.as_deref()),
         Some(Subcommands::Bless { folder }) => {
@@ -212,7 +216,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
         None => {
             options.window = !cli.boot.headless && has_display();
             let ready = setup::ready(&options)?;
-            watch(&ready, &cli.boot, cli.qemu_arguments)?;
+            watch(&ready, &cli.boot, &cli.look, cli.qemu_arguments)?;
         }
     }
     Ok(ExitCode::SUCCESS)
@@ -230,7 +234,7 @@ fn has_display() -> bool {
 }
 
 /// Boots the image and lets the user watch, or takes a picture where there is nothing to watch on.
-fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result<()> {
+fn watch(ready: &Ready, boot: &Boot, look: &Look, arguments: Vec<OsString>) -> anyhow::Result<()> {
     let displays = &ready.qemu.displays;
     let window = ["gtk", "sdl"]
         .into_iter()
@@ -253,6 +257,9 @@ fn watch(ready: &Ready, boot: &Boot, arguments: Vec<OsString>) -> anyhow::Result
         ..Config::new(ready)
     })?;
     machine.wait_until_running()?;
+    for command in look.commands() {
+        machine.ask(command)?;
+    }
     let seconds = start.elapsed().as_secs_f64();
     say(format_args!(
         "the first picture is on the screen after {seconds:.1} s"

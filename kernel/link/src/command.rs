@@ -7,14 +7,17 @@ use crate::{FrameError, unframe};
 /// A command, as it stands on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// `hold`: stop the show, clear the pages, and draw only what is asked for. From here on the
-    /// picture memory depends on the commands alone.
+    /// `hold`: stop the show, clear the pages, take every setting back, and draw only what is asked
+    /// for. From here on the picture memory depends on the commands alone.
     Hold,
     /// `run`: let the show run.
     Run,
     /// `show PICTURE`: draw it on the next page, flip, and answer when the flip holds. A show
-    /// that runs is held first.
+    /// that runs is stopped first, its settings as they are.
     Show(Picture),
+    /// `mapper NAME`, `order NAME`: from the next picture on. Without a name: which there are, and
+    /// which is set.
+    Set(Setting, Option<Word>),
     /// `dump` or `dump all`: what the card holds, read back from it, as [`crate::dump`] writes it.
     Dump(Content),
     /// `checksums` or `checksums all`: the CRC-32 of the same, and no byte of it.
@@ -93,6 +96,63 @@ impl fmt::Display for Picture {
     }
 }
 
+/// What can be set by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Setting {
+    /// `mapper`: how textures are mapped.
+    Mapper,
+    /// `order`: in which order and where to the runs of a picture are drawn.
+    Order,
+}
+
+impl Setting {
+    /// Every setting with its word.
+    pub const ALL: [(&'static str, Self); 2] = [("mapper", Self::Mapper), ("order", Self::Order)];
+}
+
+impl fmt::Display for Setting {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let word = Self::ALL.iter().find(|(_, setting)| setting == self);
+        f.write_str(word.map_or("", |(word, _)| word))
+    }
+}
+
+/// A name of something, which only the program knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Word {
+    bytes: [u8; Self::MAX],
+    len: u8,
+}
+
+impl Word {
+    /// Most characters.
+    pub const MAX: usize = 24;
+
+    /// A word of 1 to [`Word::MAX`] printable ASCII characters, no space among them.
+    pub fn new(text: &str) -> Option<Self> {
+        let legal = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic());
+        let mut bytes = [0; Self::MAX];
+        bytes
+            .get_mut(..text.len())
+            .filter(|_| legal)?
+            .copy_from_slice(text.as_bytes());
+        let len = text.len() as u8;
+        Some(Self { bytes, len })
+    }
+
+    /// Its text.
+    pub fn as_str(&self) -> &str {
+        // ASCII, as `new` has seen.
+        core::str::from_utf8(&self.bytes[..self.len.into()]).unwrap_or_default()
+    }
+}
+
+impl fmt::Display for Word {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.as_str())
+    }
+}
+
 /// How much of video memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
@@ -152,8 +212,8 @@ impl fmt::Display for CommandError<'_> {
         match self {
             Self::Unknown(word) => write!(
                 f,
-                "no command '{word}'; there are hold, run, show PICTURE, dump, checksums, \
-                 registers, counts, state, version, fail KIND, leave"
+                "no command '{word}'; there are hold, run, show PICTURE, mapper NAME, order NAME, \
+                 dump, checksums, registers, counts, state, version, fail KIND, leave"
             ),
             Self::Arguments { command, takes } => write!(f, "'{command}' takes {takes}"),
             Self::Checksum(error) => error.fmt(f),
@@ -191,6 +251,12 @@ impl Command {
             Some("all") => Ok(Content::Memory),
             Some(_) => Err(takes("nothing, or 'all'")),
         };
+        if let Some(&(_, setting)) = Setting::ALL.iter().find(|(word, _)| *word == command) {
+            let word = argument.map(|argument| {
+                Word::new(argument).ok_or(takes("nothing, or a name; alone it lists them"))
+            });
+            return Ok(Self::Set(setting, word.transpose()?));
+        }
         let plain = match command {
             "dump" => return content().map(Self::Dump),
             "checksums" => return content().map(Self::Checksums),
@@ -222,6 +288,8 @@ impl fmt::Display for Command {
             Self::Hold => f.write_str("hold"),
             Self::Run => f.write_str("run"),
             Self::Show(picture) => write!(f, "show {picture}"),
+            Self::Set(setting, None) => write!(f, "{setting}"),
+            Self::Set(setting, Some(word)) => write!(f, "{setting} {word}"),
             Self::Dump(Content::Page) => f.write_str("dump"),
             Self::Dump(Content::Memory) => f.write_str("dump all"),
             Self::Checksums(Content::Page) => f.write_str("checksums"),
@@ -259,6 +327,9 @@ mod tests {
                 roll: 0x0123_abcd,
                 distance: 1,
             }),
+            Command::Set(Setting::Mapper, None),
+            Command::Set(Setting::Order, Word::new("planes")),
+            Command::Set(Setting::Mapper, Word::new("within-1/256")),
             Command::Dump(Content::Page),
             Command::Dump(Content::Memory),
             Command::Checksums(Content::Page),
@@ -293,6 +364,8 @@ mod tests {
             ("show pose 1 2 3 4 5", "four hex numbers"),
             ("show pose +1 2 3 4", "four hex numbers"),
             ("show pose 1 2 3 123456789", "four hex numbers"),
+            ("mapper affine exact", "at most one word"),
+            ("mapper a-name-that-is-much-too-long", "nothing, or a name"),
             ("dump it", "nothing, or 'all'"),
             ("checksums all all", "at most one word"),
             ("hold on", "'hold' takes nothing"),

@@ -1,15 +1,16 @@
 //! Dumps: what a card holds, as text that `diff` can compare.
 //!
 //! ```text
-//! crystal-ball dump 1
+//! crystal-ball dump 2
 //! content page
 //! scene ball
+//! mapper shifts
 //! picture 480
 //! start 4b00
 //! size 320 240
 //! palette 00 000000 2a1c0f ...     16 lines of 16 colours, 6 bits a part: 00 to 3f
 //! line 000 6b6b6b6b ...            a line for each scan line, two hex digits a pixel
-//! end 262 lines 5d41402a
+//! end 263 lines 5d41402a
 //! ```
 //!
 //! Each of them is a line of the protocol, so it ends in its own checksum. The last one counts the
@@ -27,7 +28,7 @@ use core::fmt;
 use crate::{Checksum, Content, Picture};
 
 /// Version of the format, in a dump's first line.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// How a dump's first line begins; the version follows.
 pub const MAGIC: &str = "crystal-ball dump";
 /// Addresses of each plane.
@@ -44,6 +45,8 @@ pub struct Header<S> {
     pub content: Content,
     /// The scene's name, a word.
     pub scene: S,
+    /// The name of the mapper that drew it, a word.
+    pub mapper: S,
     /// What is on the screen; nothing before the first picture.
     pub picture: Option<Picture>,
     /// The start address: where the page on the screen begins in each plane.
@@ -160,6 +163,7 @@ pub fn write<S: fmt::Display>(
     let Header {
         content,
         scene,
+        mapper,
         picture,
         start,
         width,
@@ -168,6 +172,7 @@ pub fn write<S: fmt::Display>(
     put(format_args!("{MAGIC} {VERSION}"));
     put(format_args!("content {content}"));
     put(format_args!("scene {scene}"));
+    put(format_args!("mapper {mapper}"));
     match picture {
         Some(picture) => put(format_args!("picture {picture}")),
         None => put(format_args!("picture none")),
@@ -288,6 +293,7 @@ mod tests {
         Header {
             content,
             scene: "ball",
+            mapper: "exact",
             picture: Some(Picture::Frame(u32::MAX)),
             start: 0x4B00,
             width: 320,
@@ -313,12 +319,12 @@ mod tests {
             (Content::Memory, 820, "memory fff0 "),
         ] {
             let lines = lines(content);
-            assert_eq!(lines.len(), 6 + 16 + rows + 1);
-            assert_eq!(lines[0], "crystal-ball dump 1");
-            assert_eq!(lines[3], "picture 4294967295");
-            assert!(lines[21].starts_with("palette f0 3f0001 3f0001"));
-            assert!(lines[rows + 21].starts_with(last), "{}", lines[rows + 21]);
-            assert!(lines[rows + 22].starts_with(&std::format!("end {} lines ", rows + 22)));
+            assert_eq!(lines.len(), 7 + 16 + rows + 1);
+            assert_eq!(lines[0], "crystal-ball dump 2");
+            assert_eq!(lines[4], "picture 4294967295");
+            assert!(lines[22].starts_with("palette f0 3f0001 3f0001"));
+            assert!(lines[rows + 22].starts_with(last), "{}", lines[rows + 22]);
+            assert!(lines[rows + 23].starts_with(&std::format!("end {} lines ", rows + 23)));
             for line in &lines {
                 let mut sent = Vec::new();
                 crate::write_line(format_args!("{line}"), |bytes| {

@@ -21,19 +21,21 @@
 //! | `hold` | |
 //! | `run` | |
 //! | `show 480`, `show pose 0 13e93e93 0ccccccc 2f333` | `page 1` |
+//! | `mapper exact`, `order planes` | |
+//! | `mapper`, `order` | a line for each that there is: `exact perspective; ...`, the one that is set begins with `*` |
 //! | `dump`, `dump all` | a [`dump`] |
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
 //! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
-//! | `state` | `held` or `running tick 99`, `scene ball`, `picture 480`, `page 1 start 4b00` |
-//! | `version` | `crystal-ball 0.1.0 protocol 2 dump 1` |
+//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `page 1 start 4b00` |
+//! | `version` | `crystal-ball 0.1.0 protocol 3 dump 2` |
 //! | `fail KIND` | none: the kernel breaks in the way that is named ([`Fault`]) |
 //! | `leave` | after the `ok` QEMU ends |
 //!
 //! Commands that come while an answer is under way are answered after it, in their order. A host
 //! that does not read is waited for. Between answers the kernel says on its own:
 //!
-//! - `hello crystal-ball VERSION protocol 1`: the boot loader has handed over;
+//! - `hello crystal-ball VERSION protocol 3`: the boot loader has handed over;
 //! - `running`: the first picture is on the screen;
 //! - `panic ...`, `exception ...`, and lines that explain it, then [`END_OF_REPORT`].
 #![no_std]
@@ -44,12 +46,12 @@ pub mod dump;
 mod frame;
 mod lines;
 
-pub use command::{Command, CommandError, Content, Fault, Picture};
+pub use command::{Command, CommandError, Content, Fault, Picture, Setting, Word};
 pub use frame::{Checksum, FrameError, unframe, write_line};
 pub use lines::{Lines, Noise};
 
 /// The protocol's version, in the kernel's first line.
-pub const PROTOCOL: u32 = 2;
+pub const PROTOCOL: u32 = 3;
 /// Longest line in bytes, its checksum included, its end not: 320 pixels of a dump with their
 /// label take 657.
 pub const MAX_LINE: usize = 700;

@@ -13,10 +13,10 @@
 use core::fmt;
 
 use link::dump::{self, Header};
-use link::{Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING};
-use modex::{Bus, Counted, HEIGHT, ModeX, Readback, Tally, WIDTH};
+use link::{Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting, Word};
+use modex::{Bus, Counted, HEIGHT, ModeX, Offscreen, Readback, Tally, WIDTH};
 use scene::{Pose, Stage, Storage, TEXELS};
-use texmap::Stats;
+use texmap::{Mapper, Order, Stats};
 
 /// The program's version, as its first line and `version` tell it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -29,6 +29,7 @@ pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 pub struct Memory {
     texels: [u8; TEXELS],
     storage: Storage,
+    offscreen: Offscreen,
 }
 
 impl Memory {
@@ -37,6 +38,7 @@ impl Memory {
         Self {
             texels: [0; TEXELS],
             storage: Storage::new(),
+            offscreen: Offscreen::new(),
         }
     }
 }
@@ -72,9 +74,11 @@ struct Pace {
 pub struct Show<'a, B> {
     card: ModeX<Counted<B>>,
     stage: Stage<'a>,
+    offscreen: &'a mut Offscreen,
     lines: Lines,
-    /// The last picture, and what it took.
+    /// The last picture, by which mapper it was drawn, and what it took.
     picture: Option<Picture>,
+    mapper: Mapper,
     drawn: Stats,
     /// Nothing while the show is held.
     pace: Option<Pace>,
@@ -89,10 +93,12 @@ impl<'a, B: Bus> Show<'a, B> {
         let textures = [scene::paint_ball(&mut memory.texels)];
         let stage = Stage::new(&mut memory.storage, scene::ball(&textures));
         Self {
-            card: set(ModeX::set(Counted::new(bus), stage.palette())),
+            card: expect(ModeX::set(Counted::new(bus), stage.palette())),
             stage,
+            offscreen: &mut memory.offscreen,
             lines: Lines::new(),
             picture: None,
+            mapper: Mapper::default(),
             drawn: Stats::default(),
             pace: Some(Pace::default()),
         }
@@ -141,7 +147,11 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Carries a command out and answers it.
     pub fn obey(&mut self, command: Command, tick: u32, out: &mut Out<'_>) -> Option<Request> {
         match command {
-            Command::Hold => self.hold(),
+            Command::Hold => {
+                self.stage.set_mapper(Mapper::default());
+                self.stage.set_order(Order::default());
+                self.hold();
+            }
             Command::Run => self.pace = Some(Pace::default()),
             Command::Show(picture) => {
                 let Some(pose) = pose(picture) else {
@@ -155,6 +165,15 @@ impl<'a, B: Bus> Show<'a, B> {
                 self.draw(picture, &pose);
                 self.card.settle();
                 out(format_args!("page {}", self.card.shown_page()));
+            }
+            Command::Set(setting, None) => self.list(setting, out),
+            Command::Set(setting, Some(name)) => {
+                if self.set(setting, &name).is_none() {
+                    out(format_args!(
+                        "{ERROR} no {setting} '{name}'; '{setting}' alone lists them"
+                    ));
+                    return None;
+                }
             }
             Command::Dump(content) => {
                 let (header, palette) = (self.header(content), self.card.palette());
@@ -191,10 +210,50 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Draws a picture on the next page, and flips.
     fn draw(&mut self, picture: Picture, pose: &Pose) {
         self.card.bus().take_counts();
-        let mut canvas = self.card.begin(self.stage.background());
-        self.drawn = self.stage.draw(pose, &mut canvas);
+        let background = self.stage.background();
+        self.drawn = match self.stage.order() {
+            Order::Polygons | Order::Planes => {
+                self.stage.draw(pose, &mut self.card.begin(background))
+            }
+            Order::Buffer => {
+                self.offscreen.begin(background);
+                let drawn = self.stage.draw(pose, self.offscreen);
+                self.card.present(self.offscreen);
+                drawn
+            }
+        };
         self.card.flip();
         self.picture = Some(picture);
+        self.mapper = self.stage.mapper();
+    }
+
+    /// Sets something by name; nothing if there is no such name.
+    fn set(&mut self, setting: Setting, name: &Word) -> Option<()> {
+        match setting {
+            Setting::Mapper => self.stage.set_mapper(Mapper::parse(name.as_str())?),
+            Setting::Order => self.stage.set_order(Order::parse(name.as_str())?),
+        }
+        Some(())
+    }
+
+    /// Tells what a setting can be set to.
+    fn list(&self, setting: Setting, out: &mut Out<'_>) {
+        let mut tell = |set: bool, name: &str, about: &str| {
+            let mark = if set { "*" } else { "" };
+            out(format_args!("{mark}{name} {about}"));
+        };
+        match setting {
+            Setting::Mapper => {
+                for &(name, mapper, about) in Mapper::ALL {
+                    tell(mapper == self.stage.mapper(), name, about);
+                }
+            }
+            Setting::Order => {
+                for (name, order, about) in Order::ALL {
+                    tell(order == self.stage.order(), name, about);
+                }
+            }
+        }
     }
 
     /// Stops the show, the card as after the mode set: what follows depends on the commands
@@ -202,13 +261,14 @@ impl<'a, B: Bus> Show<'a, B> {
     fn hold(&mut self) {
         self.pace = None;
         self.picture = None;
-        set(self.card.reset(self.stage.palette()));
+        expect(self.card.reset(self.stage.palette()));
     }
 
     fn header(&self, content: Content) -> Header<&'static str> {
         Header {
             content,
             scene: self.stage.name(),
+            mapper: self.mapper.name(),
             picture: self.picture,
             start: self.card.start_address(),
             width: WIDTH as u16,
@@ -258,6 +318,8 @@ impl<'a, B: Bus> Show<'a, B> {
             None => out(format_args!("held")),
         }
         out(format_args!("scene {}", self.stage.name()));
+        out(format_args!("mapper {}", self.stage.mapper()));
+        out(format_args!("order {}", self.stage.order()));
         match self.picture {
             Some(picture) => out(format_args!("picture {picture}")),
             None => out(format_args!("picture none")),
@@ -291,7 +353,7 @@ pub fn pose(picture: Picture) -> Option<Pose> {
     }
 }
 
-fn set<T>(outcome: Result<T, Readback>) -> T {
+fn expect<T>(outcome: Result<T, Readback>) -> T {
     match outcome {
         Ok(card) => card,
         Err(readback) => panic!("Mode X is not set: {readback}"),

@@ -166,6 +166,12 @@ impl Mapper {
         named.map(|&(_, mapper, _)| mapper)
     }
 
+    /// Its name; none for one that [`Mapper::ALL`] has not.
+    pub fn name(self) -> &'static str {
+        let named = Self::ALL.iter().find(|(_, mapper, _)| *mapper == self);
+        named.map_or("", |(name, ..)| name)
+    }
+
     /// How its runs are drawn.
     pub fn style(self) -> Style {
         let mut style = Style::default();
@@ -237,7 +243,6 @@ impl Default for Mapper {
 
 impl fmt::Display for Mapper {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::ALL.iter().find(|(_, mapper, _)| mapper == self);
-        f.write_str(named.map_or("unnamed", |(name, ..)| name))
+        f.write_str(self.name())
     }
 }

@@ -30,11 +30,14 @@ pub enum Order {
     Polygons,
     /// All of plane 0, then of 1, 2 and 3: a plane is selected four times a list.
     Planes,
+    /// The same, into a page in RAM that is then presented in wide stores. What is drawn on is the
+    /// caller's to choose.
+    Buffer,
 }
 
 impl Order {
     /// Every order with its name and a line for people.
-    pub const ALL: [(&'static str, Self, &'static str); 2] = [
+    pub const ALL: [(&'static str, Self, &'static str); 3] = [
         (
             "polygons",
             Self::Polygons,
@@ -45,6 +48,11 @@ impl Order {
             Self::Planes,
             "plane by plane, Map Mask four times for a picture",
         ),
+        (
+            "buffer",
+            Self::Buffer,
+            "plane by plane into RAM, then stored eight bytes at once",
+        ),
     ];
 
     /// The order of a name.
@@ -52,12 +60,17 @@ impl Order {
         let named = Self::ALL.iter().find(|(known, ..)| *known == name);
         named.map(|&(_, order, _)| order)
     }
+
+    /// Its name.
+    pub fn name(self) -> &'static str {
+        let named = Self::ALL.iter().find(|(_, order, _)| *order == self);
+        named.map_or("", |(name, ..)| name)
+    }
 }
 
 impl fmt::Display for Order {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::ALL.iter().find(|(_, order, _)| order == self);
-        f.write_str(named.map_or("unnamed", |(name, ..)| name))
+        f.write_str(self.name())
     }
 }
 
@@ -154,7 +167,7 @@ fn draw<D: Destination, const N: usize>(
                 job.draw(style, &textures[usize::from(job.texture)], destination);
             }
         }
-        Order::Planes => {
+        Order::Planes | Order::Buffer => {
             for plane in 0..4 {
                 destination.select(plane);
                 for job in jobs.jobs() {
