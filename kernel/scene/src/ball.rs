@@ -31,6 +31,13 @@ struct Solid {
 /// Built by the compiler: the boot image carries it, nothing is computed at the start.
 static BALL: Solid = build();
 
+/// The ball.
+pub const MESH: Mesh<'static> = Mesh {
+    vertices: &BALL.vertices,
+    corners: &BALL.corners,
+    faces: &BALL.faces,
+};
+
 /// Paints the ball's texture, in full light.
 pub fn paint_ball(texels: &mut [u8; TEXELS]) -> Texture<'_> {
     for (j, row) in texels
@@ -52,11 +59,7 @@ pub fn ball<'t>(textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
     const _: () = assert!(BACKGROUND.len() == HEIGHT);
     Scene {
         name: "ball",
-        mesh: Mesh {
-            vertices: &BALL.vertices,
-            corners: &BALL.corners,
-            faces: &BALL.faces,
-        },
+        mesh: MESH,
         textures,
         palette: &PALETTE,
         light: &LIGHT_TABLE,

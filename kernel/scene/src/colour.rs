@@ -35,7 +35,9 @@ pub static PALETTE: Palette = palette();
 /// The light table of [`PALETTE`].
 pub static LIGHT_TABLE: LightTable = light_table();
 /// The colour of each scan line behind the solid.
-pub static BACKGROUND: [u8; HEIGHT] = background();
+pub static BACKGROUND: [u8; HEIGHT] = background(HORIZON);
+/// The same with the horizon level with the eye: where floors go.
+pub static LEVEL_BACKGROUND: [u8; HEIGHT] = background(HEIGHT / 2);
 
 /// Black: entry 0, which the overscan shows.
 const BLACK: u8 = 0;
@@ -205,22 +207,22 @@ const fn light_table() -> LightTable {
 /// First line of the sea: below the ball's middle, so that the glow is behind its dark side.
 const HORIZON: usize = 178;
 
-const fn background() -> [u8; HEIGHT] {
+const fn background(horizon: usize) -> [u8; HEIGHT] {
     let mut lines = [0; HEIGHT];
     // Eighths that are added to a line's place between two colours before it is cut to one. Any
     // eight lines in a row have all of them, and neighbours are far apart.
     let thresholds = [0, 4, 2, 6, 1, 5, 3, 7];
     let mut y = 0;
-    while y < HORIZON {
-        let eighths = y * (SKY - 1) * 8 / (HORIZON - 1);
+    while y < horizon {
+        let eighths = y * (SKY - 1) * 8 / (horizon - 1);
         lines[y] = (FIRST_SKY + (eighths + thresholds[y % 8]) / 8) as u8;
         y += 1;
     }
     // The horizon has the last colour; no threshold, at most 7/8, takes it to the next.
-    assert!(lines[HORIZON - 1] as usize == FIRST_SKY + SKY - 1);
-    let sea = HEIGHT - HORIZON;
+    assert!(lines[horizon - 1] as usize == FIRST_SKY + SKY - 1);
+    let sea = HEIGHT - horizon;
     while y < HEIGHT {
-        let (depth, fade) = (y - HORIZON, HEIGHT - y);
+        let (depth, fade) = (y - horizon, HEIGHT - y);
         // Waves at even distances: the nearer they are to the horizon, the closer together.
         let phase = 9000 / (depth + 8) % 64;
         let crest = if phase < 32 { phase } else { 63 - phase };

@@ -11,6 +11,7 @@
 
 mod ball;
 mod camera;
+pub mod catalogue;
 mod clip;
 mod colour;
 mod mesh;
@@ -18,6 +19,7 @@ mod noise;
 mod paint;
 mod pose;
 mod stage;
+mod surfaces;
 pub mod trig;
 
 pub use ball::{TEXELS, ball, paint_ball};
