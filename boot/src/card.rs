@@ -130,6 +130,10 @@ impl Card for Emulated<'_> {
                         }
                     }
                     Command::Set(Setting::Mapper, Some(name)) => self.mapper = name.to_string(),
+                    Command::Set(Setting::Scene, Some(name)) => {
+                        self.picture = None;
+                        self.scene = name.to_string();
+                    }
                     Command::Show(picture) => {
                         self.picture = Some(picture);
                         self.drawn_by.clone_from(&self.mapper);

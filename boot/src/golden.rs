@@ -5,7 +5,7 @@
 //! ```toml
 //! about = "The ball from so near that each of the screen's edges cuts it."
 //! show = ["0", "pose 00000000 00000000 00000000 00013333"]
-//! mapper = "linear-16"      # may be left out, as may be `order`
+//! mapper = "linear-16"      # may be left out, as may be `scene` and `order`
 //! ```
 //!
 //! and `NAME.png`, the last of these pictures, indexed. They are found by folder, so none can be
@@ -23,6 +23,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use link::{Command, Content, Picture};
+use scene::catalogue::Entry;
 use serde::Deserialize;
 use texmap::{Mapper, Order};
 
@@ -37,7 +38,7 @@ use crate::screen::Screen;
 use crate::setup::Step;
 
 /// A golden frame.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug)]
 pub struct Golden {
     /// Its name: that of its files.
     pub name: String,
@@ -57,6 +58,7 @@ pub struct Golden {
 struct Description {
     about: String,
     show: Vec<String>,
+    scene: Option<String>,
     mapper: Option<String>,
     order: Option<String>,
 }
@@ -115,6 +117,11 @@ impl Golden {
         }
         let unknown = |what, name| anyhow::anyhow!("there is no {what} '{name}'");
         let look = Look {
+            scene: (description.scene)
+                .map(|name| Entry::parse(&name).ok_or_else(|| unknown("scene", name)))
+                .transpose()
+                .with_context(wrong)?
+                .map(Named),
             mapper: (description.mapper)
                 .map(|name| Mapper::parse(&name).ok_or_else(|| unknown("mapper", name)))
                 .transpose()

@@ -1,13 +1,19 @@
 //! How pictures are drawn: what a user may choose of it, by name.
 
+use std::sync::LazyLock;
+
 use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
 use link::{Command, Setting, Word};
+use scene::catalogue::{CATALOGUE, Entry};
 use texmap::{Mapper, Order};
 
-/// Mapper and order; what is not chosen is as the program has it.
-#[derive(Args, Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// Scene, mapper and order; what is not chosen is as the program has it.
+#[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Look {
+    /// What is shown
+    #[arg(long, global = true, value_name = "NAME")]
+    pub scene: Option<Named<&'static Entry>>,
     /// How textures are mapped
     #[arg(long, global = true, value_name = "NAME")]
     pub mapper: Option<Named<Mapper>>,
@@ -20,14 +26,15 @@ impl Look {
     /// The commands that set it, after [`Command::Hold`].
     pub fn commands(&self) -> impl Iterator<Item = Command> {
         let set = |setting, name| Some(Command::Set(setting, Some(Word::new(name)?)));
+        let scene = self.scene.and_then(|s| set(Setting::Scene, s.0.name));
         let mapper = self.mapper.and_then(|m| set(Setting::Mapper, m.0.name()));
         let order = self.order.and_then(|o| set(Setting::Order, o.0.name()));
-        mapper.into_iter().chain(order)
+        scene.into_iter().chain(mapper).chain(order)
     }
 }
 
 /// Something that has a name on the command line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 pub struct Named<T>(pub T);
 
 /// All mappers, for clap's list.
@@ -51,6 +58,20 @@ impl ValueEnum for Named<Mapper> {
             .iter()
             .find(|(_, mapper, _)| *mapper == self.0)?;
         Some(PossibleValue::new(name).help(about))
+    }
+}
+
+/// All scenes.
+static SCENES: LazyLock<Vec<Named<&'static Entry>>> =
+    LazyLock::new(|| CATALOGUE.iter().map(Named).collect());
+
+impl ValueEnum for Named<&'static Entry> {
+    fn value_variants<'a>() -> &'a [Self] {
+        &SCENES
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.0.name).help(self.0.about))
     }
 }
 
@@ -85,6 +106,9 @@ mod tests {
             assert_eq!(value.get_name(), name);
             assert_eq!(Mapper::parse(name), Some(mapper));
             assert!(Word::new(name).is_some(), "{name}");
+        }
+        for entry in &CATALOGUE {
+            assert!(Word::new(entry.name).is_some(), "{}", entry.name);
         }
         assert_eq!(Named::<Order>::value_variants().len(), Order::ALL.len());
         for (named, (name, order, _)) in Named::<Order>::value_variants().iter().zip(Order::ALL) {

@@ -15,7 +15,7 @@ pub enum Command {
     /// `show PICTURE`: draw it on the next page, flip, and answer when the flip holds. A show
     /// that runs is stopped first, its settings as they are.
     Show(Picture),
-    /// `mapper NAME`, `order NAME`: from the next picture on. Without a name: which there are, and
+    /// `scene NAME`, `mapper NAME`, `order NAME`: from the next picture on. Without a name: which there are, and
     /// which is set.
     Set(Setting, Option<Word>),
     /// `dump` or `dump all`: what the card holds, read back from it, as [`crate::dump`] writes it.
@@ -99,6 +99,8 @@ impl fmt::Display for Picture {
 /// What can be set by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
+    /// `scene`: what is shown. The card is set anew.
+    Scene,
     /// `mapper`: how textures are mapped.
     Mapper,
     /// `order`: in which order and where to the runs of a picture are drawn.
@@ -107,7 +109,11 @@ pub enum Setting {
 
 impl Setting {
     /// Every setting with its word.
-    pub const ALL: [(&'static str, Self); 2] = [("mapper", Self::Mapper), ("order", Self::Order)];
+    pub const ALL: [(&'static str, Self); 3] = [
+        ("scene", Self::Scene),
+        ("mapper", Self::Mapper),
+        ("order", Self::Order),
+    ];
 }
 
 impl fmt::Display for Setting {
@@ -212,8 +218,8 @@ impl fmt::Display for CommandError<'_> {
         match self {
             Self::Unknown(word) => write!(
                 f,
-                "no command '{word}'; there are hold, run, show PICTURE, mapper NAME, order NAME, \
-                 dump, checksums, registers, counts, state, version, fail KIND, leave"
+                "no command '{word}'; there are hold, run, show PICTURE, scene NAME, mapper NAME, \
+                 order NAME, dump, checksums, registers, counts, state, version, fail KIND, leave"
             ),
             Self::Arguments { command, takes } => write!(f, "'{command}' takes {takes}"),
             Self::Checksum(error) => error.fmt(f),

@@ -21,8 +21,8 @@
 //! | `hold` | |
 //! | `run` | |
 //! | `show 480`, `show pose 0 13e93e93 0ccccccc 2f333` | `page 1` |
-//! | `mapper exact`, `order planes` | |
-//! | `mapper`, `order` | a line for each that there is: `exact perspective; ...`, the one that is set begins with `*` |
+//! | `scene cube`, `mapper exact`, `order planes` | |
+//! | `scene`, `mapper`, `order` | a line for each that there is: `exact perspective; ...`, the one that is set begins with `*` |
 //! | `dump`, `dump all` | a [`dump`] |
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |

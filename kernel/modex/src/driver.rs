@@ -58,8 +58,9 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
+    /// All zeros, so that what begins with it needs no room in the kernel's image.
     pub(crate) const NOTHING: Self = Self {
-        top: [HEIGHT as u16; GROUPS],
+        top: [0; GROUPS],
         bottom: [0; GROUPS],
     };
     pub(crate) const EVERYTHING: Self = Self {
@@ -79,9 +80,17 @@ impl Drawn {
     /// Adds the pixel columns `first..=last`, lines `top..bottom`.
     fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
         for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
-            self.top[group] = self.top[group].min(top);
-            self.bottom[group] = self.bottom[group].max(bottom);
+            self.add_to(group, top, bottom);
         }
+    }
+
+    fn add_to(&mut self, group: usize, top: u16, bottom: u16) {
+        let before = (self.top[group], self.bottom[group]);
+        let (top, bottom) = match before.0 < before.1 {
+            true => (top.min(before.0), bottom.max(before.1)),
+            false => (top, bottom),
+        };
+        (self.top[group], self.bottom[group]) = (top, bottom);
     }
 }
 
@@ -90,8 +99,9 @@ impl Drawn {
     fn or(&self, other: &Self) -> Self {
         let mut both = *self;
         for group in 0..GROUPS {
-            both.top[group] = both.top[group].min(other.top[group]);
-            both.bottom[group] = both.bottom[group].max(other.bottom[group]);
+            if other.top[group] < other.bottom[group] {
+                both.add_to(group, other.top[group], other.bottom[group]);
+            }
         }
         both
     }

@@ -13,6 +13,8 @@ use crate::{Destination, HEIGHT, Lane, PlanarBuffer};
 pub struct Offscreen {
     page: PlanarBuffer,
     drawn: Drawn,
+    /// The background is on it.
+    painted: bool,
 }
 
 impl Offscreen {
@@ -20,19 +22,28 @@ impl Offscreen {
     pub const fn new() -> Self {
         Self {
             page: PlanarBuffer::new(),
-            drawn: Drawn::EVERYTHING,
+            drawn: Drawn::NOTHING,
+            painted: false,
         }
     }
 
     /// The page on its bare background: `background[y]` is the colour of line y. Only what was
     /// drawn on is restored.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) {
+        if !core::mem::replace(&mut self.painted, true) {
+            self.drawn = Drawn::EVERYTHING;
+        }
         let drawn = core::mem::replace(&mut self.drawn, Drawn::NOTHING);
         for (group, y) in drawn.groups() {
             for plane in &mut self.page.planes {
                 plane.as_chunks_mut().0[group] = [background[y]; 8];
             }
         }
+    }
+
+    /// Has the next [`Offscreen::begin`] paint all of the background: it is another one.
+    pub fn forget(&mut self) {
+        self.painted = false;
     }
 
     /// The page.

@@ -61,6 +61,24 @@ impl Default for Storage {
     }
 }
 
+/// Where a texture's lit copies are: one for each light level, one after the other.
+#[derive(Clone, Copy, Debug, Default)]
+struct Surface {
+    first: usize,
+    width: u16,
+    height: u16,
+}
+
+impl Surface {
+    /// The copy of a light level.
+    fn lit<'t>(&self, level: usize, texels: &'t [u8; SURFACE_BYTES]) -> Texture<'t> {
+        let (width, height) = (self.width, self.height);
+        let len = Texture::padded_len(width, height);
+        let texels = &texels[self.first + level * len..][..len];
+        Texture::padded(texels, width, height).expect("a lit copy has the sides of its texture")
+    }
+}
+
 /// A scene with its textures lit.
 ///
 /// Light would cost the mapper a second look-up for every pixel. A face has one light level, so
@@ -74,8 +92,8 @@ pub struct Stage<'a> {
     background: &'a [u8; HEIGHT],
     mapper: Mapper,
     order: Order,
-    /// `surfaces[texture * LIGHT_LEVELS + level]`.
-    surfaces: [Texture<'a>; MAX_TEXTURES * LIGHT_LEVELS],
+    surfaces: [Surface; MAX_TEXTURES],
+    texels: &'a mut [u8; SURFACE_BYTES],
     points: &'a mut [Point; MAX_VERTICES],
     jobs: &'a mut JobList<MAX_JOBS>,
 }
@@ -84,10 +102,37 @@ impl<'a> Stage<'a> {
     /// Lights the textures of `scene` into `storage`.
     ///
     /// # Panics
-    /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or textures
-    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together, each padded to powers of two. If a face has fewer than
-    /// 3 or more than [`MAX_CORNERS`] corners, or a vertex is further out than [`MAX_EXTENT`].
+    /// As [`Stage::set`].
     pub fn new(storage: &'a mut Storage, scene: Scene<'a, '_>) -> Self {
+        let Storage {
+            surfaces,
+            points,
+            jobs,
+        } = storage;
+        let mut stage = Self {
+            name: scene.name,
+            mesh: scene.mesh,
+            palette: scene.palette,
+            background: scene.background,
+            mapper: Mapper::default(),
+            order: Order::default(),
+            surfaces: [Surface::default(); MAX_TEXTURES],
+            texels: surfaces,
+            points,
+            jobs,
+        };
+        stage.set(scene);
+        stage
+    }
+
+    /// Puts another scene on the stage, its textures lit.
+    ///
+    /// # Panics
+    /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or textures
+    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together, each padded to powers of
+    /// two. If a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further
+    /// out than [`MAX_EXTENT`].
+    pub fn set(&mut self, scene: Scene<'a, '_>) {
         assert!(
             scene.mesh.vertices.len() <= MAX_VERTICES && scene.textures.len() <= MAX_TEXTURES,
             "the scene has {} vertices and {} textures; the arenas hold {MAX_VERTICES} and {MAX_TEXTURES}",
@@ -109,46 +154,35 @@ impl<'a> Stage<'a> {
                 "vertex {i} is at {vertex:?}, outside +-{MAX_EXTENT}",
             );
         }
-        let Storage {
-            surfaces: arena,
-            points,
-            jobs,
-        } = storage;
-        let mut free = &mut arena[..];
-        let mut surfaces = [Texture::DOT; MAX_TEXTURES * LIGHT_LEVELS];
-        for (texture, surfaces) in scene
-            .textures
-            .iter()
-            .zip(surfaces.chunks_exact_mut(LIGHT_LEVELS))
-        {
-            for (light, surface) in scene.light.iter().zip(surfaces) {
-                let (width, height) = (texture.width(), texture.height());
-                let (lit, rest) = free
-                    .split_at_mut_checked(Texture::padded_len(width, height))
+        let mut free = 0;
+        self.surfaces = [Surface::default(); MAX_TEXTURES];
+        for (texture, surface) in scene.textures.iter().zip(&mut self.surfaces) {
+            let (width, height) = (texture.width(), texture.height());
+            let len = Texture::padded_len(width, height);
+            *surface = Surface {
+                first: free,
+                width,
+                height,
+            };
+            let pitch = usize::from(width).next_power_of_two();
+            for light in scene.light {
+                let lit = self
+                    .texels
+                    .get_mut(free..free + len)
                     .expect("the scene's textures are larger than the surface arena");
-                free = rest;
-                let pitch = usize::from(width).next_power_of_two();
+                free += len;
                 let rows = texture.texels().chunks_exact(texture.pitch().into());
                 for (lit, row) in lit.chunks_exact_mut(pitch).zip(rows) {
                     for (lit, &texel) in lit.iter_mut().zip(&row[..width.into()]) {
                         *lit = light[usize::from(texel)];
                     }
                 }
-                *surface = Texture::padded(lit, width, height)
-                    .expect("a lit copy has the sides of its texture");
             }
         }
-        Self {
-            name: scene.name,
-            mesh: scene.mesh,
-            palette: scene.palette,
-            background: scene.background,
-            mapper: Mapper::default(),
-            order: Order::default(),
-            surfaces,
-            points,
-            jobs,
-        }
+        self.name = scene.name;
+        self.mesh = scene.mesh;
+        self.palette = scene.palette;
+        self.background = scene.background;
     }
 
     /// The scene's name.
@@ -167,8 +201,9 @@ impl<'a> Stage<'a> {
     }
 
     /// A texture in the light of a face, by the number that [`Face`] has.
-    pub fn surface(&self, number: u16) -> Texture<'a> {
-        self.surfaces[usize::from(number)]
+    pub fn surface(&self, number: u16) -> Texture<'_> {
+        let number = usize::from(number);
+        self.surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, self.texels)
     }
 
     /// How pictures are mapped.
@@ -195,7 +230,16 @@ impl<'a> Stage<'a> {
     /// 0 to [`Pose::MAX_DISTANCE`] every face is dropped; at any other none is.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
         let (mapper, order) = (self.mapper, self.order);
-        let mut renderer = Renderer::new(self.jobs, &self.surfaces, destination, mapper, order);
+        let mut surfaces = [Texture::DOT; MAX_TEXTURES * LIGHT_LEVELS];
+        let lit = surfaces.chunks_exact_mut(LIGHT_LEVELS);
+        for (surface, lit) in self.surfaces.iter().zip(lit) {
+            if surface.width > 0 {
+                for (level, lit) in lit.iter_mut().enumerate() {
+                    *lit = surface.lit(level, self.texels);
+                }
+            }
+        }
+        let mut renderer = Renderer::new(self.jobs, &surfaces, destination, mapper, order);
         polygons(&self.mesh, self.points, pose, |face| match face {
             None => renderer.drop_face(),
             Some(face) => renderer.face(&face),

@@ -15,7 +15,8 @@ use core::fmt;
 use link::dump::{self, Header};
 use link::{Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting, Word};
 use modex::{Bus, Counted, HEIGHT, ModeX, Offscreen, Readback, Tally, WIDTH};
-use scene::{Pose, Stage, Storage, TEXELS};
+use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+use scene::{Pose, Stage, Storage};
 use texmap::{Mapper, Order, Stats};
 
 /// The program's version, as its first line and `version` tell it.
@@ -27,7 +28,7 @@ pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 /// The fixed memory of the program. About 2 MiB: meant for a static.
 #[derive(Debug)]
 pub struct Memory {
-    texels: [u8; TEXELS],
+    texels: [u8; MAX_TEXELS],
     storage: Storage,
     offscreen: Offscreen,
 }
@@ -36,7 +37,7 @@ impl Memory {
     /// Empty.
     pub const fn new() -> Self {
         Self {
-            texels: [0; TEXELS],
+            texels: [0; MAX_TEXELS],
             storage: Storage::new(),
             offscreen: Offscreen::new(),
         }
@@ -73,6 +74,9 @@ struct Pace {
 #[derive(Debug)]
 pub struct Show<'a, B> {
     card: ModeX<Counted<B>>,
+    /// The scene on the stage, and where its texture is painted.
+    entry: &'static Entry,
+    texels: &'a mut [u8; MAX_TEXELS],
     stage: Stage<'a>,
     offscreen: &'a mut Offscreen,
     lines: Lines,
@@ -90,9 +94,12 @@ impl<'a, B: Bus> Show<'a, B> {
     /// # Panics
     /// If the card does not read back as it was set: it can't be drawn on.
     pub fn new(memory: &'a mut Memory, bus: B) -> Self {
-        let textures = [scene::paint_ball(&mut memory.texels)];
-        let stage = Stage::new(&mut memory.storage, scene::ball(&textures));
+        let entry = &CATALOGUE[0];
+        let textures = [entry.paint(&mut memory.texels)];
+        let stage = Stage::new(&mut memory.storage, entry.scene(&textures));
         Self {
+            entry,
+            texels: &mut memory.texels,
             card: expect(ModeX::set(Counted::new(bus), stage.palette())),
             stage,
             offscreen: &mut memory.offscreen,
@@ -116,7 +123,7 @@ impl<'a, B: Bus> Show<'a, B> {
 
     /// Shows the running show's picture of `tick`.
     pub fn present(&mut self, tick: u32, out: &mut Out<'_>) {
-        self.draw(Picture::Frame(tick), &Pose::at_tick(tick));
+        self.draw(Picture::Frame(tick), &self.entry.pose(tick));
         let Some(pace) = &mut self.pace else { return };
         let before = pace.last.replace(tick);
         pace.late += u32::from(before.is_some_and(|before| tick.wrapping_sub(before) > 1));
@@ -150,11 +157,12 @@ impl<'a, B: Bus> Show<'a, B> {
             Command::Hold => {
                 self.stage.set_mapper(Mapper::default());
                 self.stage.set_order(Order::default());
+                self.set_scene(&CATALOGUE[0]);
                 self.hold();
             }
             Command::Run => self.pace = Some(Pace::default()),
             Command::Show(picture) => {
-                let Some(pose) = pose(picture) else {
+                let Some(pose) = pose(self.entry, picture) else {
                     let most = Pose::MAX_DISTANCE;
                     out(format_args!("{ERROR} a distance is 0 to {most:08x}"));
                     return None;
@@ -230,10 +238,24 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Sets something by name; nothing if there is no such name.
     fn set(&mut self, setting: Setting, name: &Word) -> Option<()> {
         match setting {
+            Setting::Scene => {
+                self.set_scene(Entry::parse(name.as_str())?);
+                self.reset();
+            }
             Setting::Mapper => self.stage.set_mapper(Mapper::parse(name.as_str())?),
             Setting::Order => self.stage.set_order(Order::parse(name.as_str())?),
         }
         Some(())
+    }
+
+    /// Puts a scene on the stage; the card has to be reset then, for its palette and background.
+    fn set_scene(&mut self, entry: &'static Entry) {
+        if entry.name != self.entry.name {
+            self.entry = entry;
+            let textures = [entry.paint(self.texels)];
+            self.stage.set(entry.scene(&textures));
+            self.offscreen.forget();
+        }
     }
 
     /// Tells what a setting can be set to.
@@ -243,6 +265,11 @@ impl<'a, B: Bus> Show<'a, B> {
             out(format_args!("{mark}{name} {about}"));
         };
         match setting {
+            Setting::Scene => {
+                for entry in &CATALOGUE {
+                    tell(entry.name == self.entry.name, entry.name, entry.about);
+                }
+            }
             Setting::Mapper => {
                 for &(name, mapper, about) in Mapper::ALL {
                     tell(mapper == self.stage.mapper(), name, about);
@@ -260,6 +287,11 @@ impl<'a, B: Bus> Show<'a, B> {
     /// alone, and not on how far the show had come.
     fn hold(&mut self) {
         self.pace = None;
+        self.reset();
+    }
+
+    /// Sets the card anew: no picture is on it.
+    fn reset(&mut self) {
         self.picture = None;
         expect(self.card.reset(self.stage.palette()));
     }
@@ -332,10 +364,10 @@ impl<'a, B: Bus> Show<'a, B> {
     }
 }
 
-/// The pose of a picture; none if it is outside the legal range.
-pub fn pose(picture: Picture) -> Option<Pose> {
+/// The pose of a scene's picture; none if it is outside the legal range.
+pub fn pose(scene: &Entry, picture: Picture) -> Option<Pose> {
     match picture {
-        Picture::Frame(frame) => Some(Pose::at_tick(frame)),
+        Picture::Frame(frame) => Some(scene.pose(frame)),
         Picture::Pose {
             yaw,
             pitch,
