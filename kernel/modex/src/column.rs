@@ -3,7 +3,7 @@
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 
-use crate::STRIDE;
+use crate::{HEIGHT, STRIDE, WIDTH};
 
 /// A place for pixels, addressed by runs that lie in one plane.
 ///
@@ -40,15 +40,27 @@ pub trait Destination {
         self.lane(x, y, len, draw);
     }
 
-    /// Writes the `len` pixels from (x, y) to the right, the plane selected for each.
+    /// Writes the `len` pixels from (x, y) to the right in order, the plane selected for each;
+    /// `texel` is called once for each. Which plane is selected afterwards is not said.
     ///
     /// # Panics
     /// As [`Destination::lane`].
     fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {
+        check_row(x, y, len);
         for x in x..x + len {
             self.column(x, y, 1, |pixel| pixel.fill(&mut texel));
         }
     }
+}
+
+/// The last screen column of a row, checked to lie in the picture.
+pub(crate) fn check_row(x: u16, y: u16, len: u16) -> u16 {
+    let more = len.wrapping_sub(1);
+    assert!(
+        x < WIDTH as u16 && y < HEIGHT as u16 && more < WIDTH as u16 - x,
+        "{len} pixels in a row at ({x}, {y}) are not in the picture"
+    );
+    x + more
 }
 
 /// A column of one plane: 80 bytes from pixel to pixel.

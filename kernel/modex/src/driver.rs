@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::column::check_row;
 use crate::registers::*;
 use crate::{
     Bus, Destination, HEIGHT, Lane, Offscreen, PAGE_BYTES, PAGES, PLANE_BYTES, Purpose, STRIDE,
@@ -334,6 +335,21 @@ impl<B: Bus> Destination for Canvas<'_, B> {
         self.drawn.lane::<STEP>(x, y, len);
         let at = self.page_start + usize::from(y) * STRIDE + usize::from(x) / 4;
         self.bus.lane(at as u16, len, draw);
+    }
+
+    /// One Map Mask write and one store a pixel. The mask is kept twice in a byte and rotated: the
+    /// bit that comes round into bit 0 is the step of the address, from plane 3 to plane 0.
+    fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {
+        let last = check_row(x, y, len);
+        self.drawn.add(x, last, y, y + 1);
+        let mut at = (self.page_start + usize::from(y) * STRIDE + usize::from(x) / 4) as u16;
+        let mut planes = 0x11u8 << (x & 3);
+        for _ in 0..len {
+            write(self.bus, SEQUENCER, MAP_MASK, planes & ALL_PLANES);
+            self.bus.lane::<1>(at, 1, |pixel| pixel.fill(&mut texel));
+            planes = planes.rotate_left(1);
+            at += u16::from(planes & 1);
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use core::ptr::NonNull;
 
+use crate::column::check_row;
 use crate::driver::check_lane;
 use crate::{Destination, HEIGHT, Lane, PAGE_BYTES, STRIDE, WIDTH};
 
@@ -64,5 +65,13 @@ impl Destination for PlanarBuffer {
         // SAFETY: the slice spans the lane from its first byte to its last, it was cut with
         // bounds checks, and its exclusive borrow lives until `draw` returns.
         draw(unsafe { Lane::new(base, len) });
+    }
+
+    fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {
+        let last = check_row(x, y, len);
+        let line = usize::from(y) * STRIDE;
+        for x in usize::from(x)..=usize::from(last) {
+            self.planes[x & 3][line + x / 4] = texel();
+        }
     }
 }

@@ -337,6 +337,89 @@ fn a_column_beyond_the_page_is_refused() {
     PlanarBuffer::new().column(0, 200, 41, |column| column.fill(|| 0));
 }
 
+/// A row from every plane to every plane, of one pixel, across the picture and at its corners.
+fn rows() -> impl Iterator<Item = (u16, u16, u16)> {
+    let starts = (0..4).flat_map(|x| (1..=9).map(move |len| (x + 36, 7, len)));
+    let ends = (1..=9).map(|len| (WIDTH as u16 - len, HEIGHT as u16 - 1, len));
+    starts.chain(ends).chain([(0, 0, WIDTH as u16), (0, 0, 1)])
+}
+
+#[test]
+fn a_row_takes_one_mask_and_one_store_a_pixel() {
+    let background = [9; HEIGHT];
+    for (x, y, len) in rows() {
+        let mut recorder = Recorder::new();
+        let mut card = ModeX::set(Counted::new(&mut recorder), &BLACK).unwrap();
+        let mut expected = PlanarBuffer::new();
+        expected.clear(&background);
+        let mut flat = expected.clone();
+        // Pixel by pixel, as a column of one: what a row has to come to.
+        for (x, colour) in (x..x + len).zip(100u16..) {
+            expected.column(x, y, 1, |pixel| pixel.fill(|| colour as u8));
+        }
+        let colours = |start: u8| {
+            let mut next = start;
+            move || {
+                next = next.wrapping_add(1);
+                next
+            }
+        };
+        flat.row(x, y, len, colours(99));
+        assert!(flat == expected, "in RAM, {len} from ({x}, {y})");
+
+        let mut canvas = card.begin(&background);
+        canvas.row(x, y, len, colours(99));
+        let draw = card.bus().counts().draw;
+        let pixels = u64::from(len);
+        assert_eq!((draw.map_mask, draw.ports), (pixels, pixels));
+        assert_eq!((draw.stores, draw.bytes), (pixels, pixels));
+        let log = &card.bus().inner().log;
+        let last = log[log.len() - 2 * usize::from(len)..].chunks_exact(2);
+        for (x, pair) in (x..).zip(last) {
+            let at = PAGE_BYTES as u16 + y * 80 + x / 4;
+            let mask = u16::from_le_bytes([MAP_MASK, 1 << (x & 3)]);
+            assert_eq!(
+                pair,
+                [Access::Out16(SEQUENCER, mask), Access::Store(at)],
+                "pixel {x} of {len} from ({x}, {y})"
+            );
+        }
+        assert!(page(card.bus().inner(), 1) == expected, "on the card");
+        // It is known to be drawn on: two rounds of pages later nothing of it is left.
+        for _ in 0..PAGES {
+            card.begin(&background);
+            card.flip();
+        }
+        let mut bare = PlanarBuffer::new();
+        bare.clear(&background);
+        assert!(page(card.bus().inner(), 1) == bare, "erased");
+    }
+}
+
+#[test]
+fn a_row_that_leaves_the_picture_is_refused() {
+    let refused = |x, y, len| {
+        let ram = std::panic::catch_unwind(|| PlanarBuffer::new().row(x, y, len, || 0));
+        let card = std::panic::catch_unwind(|| {
+            let mut recorder = Recorder::new();
+            let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
+            card.begin(&[0; HEIGHT]).row(x, y, len, || 0);
+        });
+        assert_eq!(ram.is_err(), card.is_err());
+        ram.is_err()
+    };
+    assert!(!refused(319, 239, 1) && !refused(0, 0, 320));
+    for (x, y, len) in [
+        (0, 0, 0),
+        (319, 0, 2),
+        (1, 0, 320),
+        (320, 0, 1),
+        (0, 240, 1),
+    ] {
+        assert!(refused(x, y, len), "{len} from ({x}, {y})");
+    }
+}
+
 #[test]
 fn pixels_come_back_from_their_planes_and_nothing_is_stored() {
     let mut counted = Counted::new(Recorder::new());
