@@ -50,6 +50,9 @@ pub enum Dropped {
     OutOfRange,
 }
 
+/// Most runs in a line: a side begins or ends one.
+pub(crate) const MAX_RUNS: usize = MAX_SIDES / 2;
+
 /// Which way a run of pixels goes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {

@@ -1,20 +1,70 @@
 //! The free direction: along the line of constant depth, wherever it goes.
+//!
+//! Every plane has lines of constant depth on the screen: those along which c stays, c.right dx +
+//! c.down dy = 0. Along one of them u and v are linear, and one division serves it. Pixels do not
+//! lie on it, so it is drawn through those nearest to it: a line nearer the horizontal has one pixel
+//! in every column that it crosses, one nearer the vertical one in every row. The lines are the
+//! same one moved by whole pixels (down, or to the right), so each pixel of the screen lies on
+//! exactly one.
+//!
+//! # Which pixels
+//!
+//! Those of coverage, each once. Say the line is nearer the horizontal, S(x) whole pixels down at
+//! column x. Pixel (x, y) lies on line y - S(x), and an inside run of column x becomes a range of
+//! lines. Going from a column to the next, the lines that are in a range no longer are closed, each
+//! a job from the column where it was opened; those that are new are opened. Only what differs is
+//! looked at. Nearer the vertical, columns and rows change places.
+//!
+//! # Error
+//!
+//! The line passes up to half a pixel beside the centres of its pixels, across it: down a column
+//! where it is nearer the horizontal. There u is a hyperbola, so the error is no larger than the
+//! larger of u's differences between the centre and the two places [`ASIDE`] of a pixel above and
+//! below it, plus what [`level::drift`] says for the pixel's number in its line. To first order that
+//! is half a pixel's worth of the texture's gradient across the line; it is reached. Where c is not
+//! above zero on a line, or its coordinates leave [`REACH`](crate::straight::REACH), its pixels are
+//! drawn exactly.
+
+use crate::coverage::{Axis, Dropped, MAX_RUNS, runs};
+use crate::job::{self, Job};
+use crate::level::Line;
+use crate::plane::{self, Form, Plane};
+use crate::{Face, Texture, affine};
+use modex::{HEIGHT, WIDTH};
+
+/// Fraction bits of a line's place aside: 320 steps leave it within 2^-14 pixel.
+const FRACTION: u32 = 22;
+/// Furthest that a line passes from a pixel's centre, in pixels: half of one, and what the steps
+/// of its place leave.
+pub const ASIDE: f64 = 0.5 + 1.0 / (1 << 14) as f64;
+/// Half a pixel.
+const HALF: i32 = 1 << (FRACTION - 1);
+/// Lines that meet the screen: one for each pixel of its first column, and one more for each
+/// pixel that the slope, 1 at most, takes it aside over the width. Rows have as many.
+const LINES: usize = WIDTH + HEIGHT;
 
 /// A walk along a line that leaves its row or column pixel by pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Walk {
     /// The texture's coordinates and their steps along the line.
-    pub texture: crate::affine::Walk,
-    /// How far aside the line is at the first pixel, 16.16 pixels.
+    pub texture: affine::Walk,
+    /// How far aside the line is at the first pixel: 22 fraction bits, 0 to 1.
     pub aside: i32,
-    /// Its step.
+    /// Its step, -1 to 1.
     pub slope: i32,
 }
 
 impl Walk {
     /// Pixels that pixel `i` lies aside of the first one's row or column.
     pub fn aside(&self, i: u16) -> i16 {
-        ((self.aside + self.slope * i32::from(i)) >> 16) as i16
+        ((self.aside + self.slope * i32::from(i)) >> FRACTION) as i16
+    }
+
+    /// How many pixels from `i` on, of `len` in all, lie in the same row or column.
+    pub(crate) fn straight(&self, i: u16, len: u16) -> u16 {
+        let here = self.aside(i);
+        let end = (i + 1..len).find(|&next| self.aside(next) != here);
+        end.unwrap_or(len) - i
     }
 }
 
@@ -24,4 +74,222 @@ impl Iterator for Walk {
     fn next(&mut self) -> Option<(i32, i32)> {
         self.texture.next()
     }
+}
+
+/// The lines of constant depth of a plane.
+#[derive(Debug)]
+struct Lines {
+    plane: Plane,
+    /// Which way a line goes from pixel to pixel.
+    axis: Axis,
+    /// How far aside it is at pixel 0, and its step, with [`FRACTION`] bits.
+    start: i32,
+    slope: i32,
+    /// Steps of a and b along a line.
+    step: [i64; 2],
+}
+
+/// A form's steps: along `axis`, and aside of it.
+fn steps(form: &Form, axis: Axis) -> (i64, i64) {
+    match axis {
+        Axis::Right => (form.right, form.down),
+        Axis::Down => (form.down, form.right),
+    }
+}
+
+/// The pixel at its places along `axis` and aside of it.
+fn place(axis: Axis, along: u16, aside: u16) -> (u16, u16) {
+    match axis {
+        Axis::Right => (along, aside),
+        Axis::Down => (aside, along),
+    }
+}
+
+/// n / d, rounded to nearest.
+fn rounded(n: i128, d: i128) -> i128 {
+    let (n, d) = if d < 0 { (-n, -d) } else { (n, d) };
+    (2 * n + d).div_euclid(2 * d)
+}
+
+impl Lines {
+    fn new(plane: &Plane) -> Self {
+        // A line goes the way in which c changes less.
+        let axis = match plane.c.right.unsigned_abs() < plane.c.down.unsigned_abs() {
+            true => Axis::Right,
+            false => Axis::Down,
+        };
+        let (c_along, c_aside) = steps(&plane.c, axis);
+        // Both zero: depth is constant all over, and any line is one.
+        let c_aside = if c_aside == 0 { 1 } else { c_aside };
+        let slope = rounded(-(i128::from(c_along) << FRACTION), c_aside.into()) as i32;
+        // A step's unit lost is one of the form's last place for each pixel.
+        let step = [plane.a, plane.b].map(|form| {
+            let (along, aside) = steps(&form, axis);
+            let share = i128::from(aside) * i128::from(c_along);
+            along - rounded(share, c_aside.into()) as i64
+        });
+        let pixels = match axis {
+            Axis::Right => WIDTH,
+            Axis::Down => HEIGHT,
+        };
+        // Lines are numbered from 0: none lies before the screen's first pixel. A line without
+        // slope goes through the centres.
+        let furthest = HALF + slope * (pixels as i32 - 1);
+        let start = HALF - (furthest.max(HALF) >> FRACTION << FRACTION);
+        Self {
+            plane: *plane,
+            axis,
+            start,
+            slope,
+            step,
+        }
+    }
+
+    /// How far aside a line is at pixel `along`, from where it is numbered; below zero.
+    fn aside(&self, along: u16) -> i32 {
+        self.start + self.slope * i32::from(along)
+    }
+
+    /// The number of the line through a pixel, by its places along the axis and aside of it.
+    fn line(&self, along: u16, aside: u16) -> usize {
+        (i32::from(aside) - (self.aside(along) >> FRACTION)) as usize
+    }
+
+    /// Gives `sink` the jobs of the pixels `from..to` of a line.
+    fn draw(
+        &self,
+        line: usize,
+        from: u16,
+        to: u16,
+        texture: &Texture<'_>,
+        number: u16,
+        mut sink: impl FnMut(Job),
+    ) {
+        let start = self.aside(from);
+        let len = to - from;
+        let skew = |first: u16| {
+            let place = start + self.slope * i32::from(first);
+            let aside = (line as i32 + (place >> FRACTION)) as u16;
+            (aside, place & ((1 << FRACTION) - 1))
+        };
+        let job = |first: u16, len: u16, walk| {
+            let (aside, _) = skew(first);
+            Job::new(self.axis, aside, from + first, len, number, walk)
+        };
+        let walk = |first: u16, texture| Walk {
+            texture,
+            aside: skew(first).1,
+            slope: self.slope,
+        };
+        // On the line itself, beside the first pixel's centre.
+        let (aside, fraction) = skew(0);
+        let (x, y) = place(self.axis, from, aside);
+        let at = [self.plane.a, self.plane.b, self.plane.c].map(|form| {
+            let (_, step) = steps(&form, self.axis);
+            let beside = i128::from(step) * i128::from(fraction - HALF);
+            form.at(x, y) + (beside >> FRACTION) as i64
+        });
+        let forms = Line {
+            at,
+            step: self.step,
+        };
+        if let Some(straight) = forms.straight(len) {
+            straight.pieces(len, texture.last(), |first, len, texture| {
+                sink(job(first, len, job::Walk::Free(walk(first, texture))));
+            });
+            return;
+        }
+        let pixels = walk(0, affine::Walk::default());
+        let mut first = 0;
+        while first < len {
+            let straight = pixels.straight(first, len);
+            let (aside, _) = skew(first);
+            let (x, y) = place(self.axis, from + first, aside);
+            let exact = plane::Walk::new(&self.plane, self.axis, x, y);
+            sink(job(first, straight, job::Walk::Exact(exact)));
+            first += straight;
+        }
+    }
+}
+
+/// The lines that are inside at one place: ranges in order, none touching another's inside.
+#[derive(Clone, Copy, Debug)]
+struct Inside {
+    ranges: [(usize, usize); MAX_RUNS],
+    len: usize,
+}
+
+impl Inside {
+    const NOTHING: Self = Self {
+        ranges: [(0, 0); MAX_RUNS],
+        len: 0,
+    };
+
+    fn add(&mut self, range: (usize, usize)) {
+        self.ranges[self.len] = range;
+        self.len += 1;
+    }
+
+    fn ranges(&self) -> &[(usize, usize)] {
+        &self.ranges[..self.len]
+    }
+
+    /// Gives `sink` the lines that are inside here and not in `other`.
+    fn without(&self, other: &Self, mut sink: impl FnMut(usize)) {
+        for &(mut first, end) in self.ranges() {
+            for &(from, to) in other.ranges() {
+                for line in first..from.min(end) {
+                    sink(line);
+                }
+                first = first.max(to);
+            }
+            for line in first..end {
+                sink(line);
+            }
+        }
+    }
+}
+
+/// Gives `sink` the jobs of a face.
+///
+/// # Errors
+/// A polygon outside the legal range; nothing of it was given to `sink`.
+pub(crate) fn jobs(
+    face: &Face<'_>,
+    texture: &Texture<'_>,
+    mut sink: impl FnMut(Job),
+) -> Result<(), Dropped> {
+    let lines = Lines::new(&face.plane());
+    // The runs go across the lines.
+    let across = match lines.axis {
+        Axis::Right => Axis::Down,
+        Axis::Down => Axis::Right,
+    };
+    let mut opened = [0; LINES];
+    let (mut before, mut now) = (Inside::NOTHING, Inside::NOTHING);
+    let mut here = 0;
+    let mut go = |to: u16, before: &Inside, now: &Inside| {
+        before.without(now, |line| {
+            lines.draw(line, opened[line], to, texture, face.texture, &mut sink);
+        });
+        now.without(before, |line| opened[line] = to);
+    };
+    runs(across, face.polygon, |run| {
+        if run.line != here {
+            go(here, &before, &now);
+            (before, now) = (now, Inside::NOTHING);
+            if run.line != here + 1 {
+                go(here + 1, &before, &now);
+                before = now;
+            }
+            here = run.line;
+        }
+        now.add((
+            lines.line(run.line, run.first),
+            lines.line(run.line, run.first + run.len),
+        ));
+    })?;
+    go(here, &before, &now);
+    go(here + 1, &now, &Inside::NOTHING);
+    Ok(())
 }

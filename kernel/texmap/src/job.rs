@@ -5,7 +5,7 @@ use modex::Destination;
 use crate::coverage::Axis;
 use crate::loops::Loop;
 use crate::runs::{Pieces, Steps};
-use crate::{Texture, affine, exact, free, plane};
+use crate::{Texture, affine, exact, free, level, plane};
 
 /// How a run's texture is walked: starts and steps, one mapper's or another's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,6 +18,8 @@ pub enum Walk {
     Linear(plane::Walk, Pieces),
     /// [`Steps::quadratic`].
     Quadratic(plane::Walk, Pieces),
+    /// [`level`]: one coordinate stays.
+    Wall(level::Wall),
     /// [`free`]: the run leaves its row or column.
     Free(free::Walk),
 }
@@ -61,6 +63,29 @@ pub struct Job {
 }
 
 impl Job {
+    /// The run of `len` pixels from pixel `first` of column or row `line`.
+    pub(crate) fn new(
+        axis: Axis,
+        line: u16,
+        first: u16,
+        len: u16,
+        texture: u16,
+        walk: Walk,
+    ) -> Self {
+        let (x, y) = match axis {
+            Axis::Down => (line, first),
+            Axis::Right => (first, line),
+        };
+        Self {
+            axis,
+            x,
+            y,
+            len,
+            texture,
+            walk,
+        }
+    }
+
     /// Each pixel with its coordinates in the texture, 16.16: the clear twin of [`Job::draw`].
     /// The exact mapper's are rounded down.
     pub fn pixels(&self, texture: &Texture<'_>, mut sink: impl FnMut((u16, u16), (i32, i32))) {
@@ -86,11 +111,15 @@ impl Job {
 
     /// Draws the run.
     pub fn draw(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
-        if self.axis == Axis::Down && !matches!(self.walk, Walk::Free(_)) {
-            destination.select(self.x);
-            self.draw_column(style, texture, destination);
-        } else {
-            self.draw_row(style, texture, destination);
+        match (self.walk, self.axis) {
+            (Walk::Free(walk), _) => {
+                self.straight(&walk, |job| job.draw(style, texture, destination));
+            }
+            (_, Axis::Down) => {
+                destination.select(self.x);
+                self.draw_column(style, texture, destination);
+            }
+            (_, Axis::Right) => self.draw_row(style, texture, destination),
         }
     }
 
@@ -102,14 +131,31 @@ impl Job {
         texture: &Texture<'_>,
         destination: &mut impl Destination,
     ) {
-        let column = self.axis == Axis::Down && !matches!(self.walk, Walk::Free(_));
-        if column {
-            if self.x & 3 == plane {
-                self.draw_column(style, texture, destination);
-            }
-            return;
+        match (self.walk, self.axis) {
+            (Walk::Free(walk), _) => self.straight(&walk, |job| {
+                job.draw_in_plane(plane, style, texture, destination);
+            }),
+            (_, Axis::Down) if self.x & 3 != plane => {}
+            (_, Axis::Down) => self.draw_column(style, texture, destination),
+            (_, Axis::Right) => self.draw_part(plane, texture, destination),
         }
-        self.draw_part(plane, texture, destination);
+    }
+
+    /// The run in the free direction as affine runs, each within its row or column.
+    fn straight(&self, walk: &free::Walk, mut sink: impl FnMut(Self)) {
+        let mut first = 0;
+        while first < self.len {
+            let len = walk.straight(first, self.len);
+            let (x, y) = self.place(first);
+            sink(Self {
+                x,
+                y,
+                len,
+                walk: Walk::Affine(walk.texture.every(1, first.into())),
+                ..*self
+            });
+            first += len;
+        }
     }
 
     /// A column, its plane selected.
@@ -117,6 +163,7 @@ impl Job {
         destination.lane(self.x, self.y, self.len, |column| match self.walk {
             Walk::Affine(walk) => style.affine.column(texture, walk, column),
             Walk::Exact(walk) => exact::column(texture, walk, self.len, column),
+            Walk::Wall(wall) => wall.column(texture, column),
             Walk::Linear(walk, pieces) => {
                 let mut steps = Steps::linear(walk, self.len, pieces, texture);
                 column.fill(|| texel(texture, steps.next()));
@@ -129,7 +176,7 @@ impl Job {
         });
     }
 
-    /// A row, or a run that leaves its row or column.
+    /// A row.
     fn draw_row(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
         match (style.rows, self.walk) {
             (Rows::Multiply, Walk::Affine(walk)) => {
@@ -150,14 +197,6 @@ impl Job {
                         destination.select(plane);
                         self.draw_part(plane, texture, destination);
                     }
-                }
-            }
-            (_, Walk::Free(_)) => {
-                let mut coordinates = Coordinates::new(self, texture);
-                for i in 0..self.len {
-                    let (x, y) = self.place(i);
-                    let (u, v) = coordinates.next();
-                    destination.column(x, y, 1, |pixel| pixel.fill(|| texture.at(u, v)));
                 }
             }
             _ => {
@@ -185,10 +224,11 @@ impl Job {
             _ => {
                 let mut coordinates = Coordinates::new(self, texture);
                 for i in 0..self.len {
-                    let (x, y) = self.place(i);
                     let (u, v) = coordinates.next();
+                    let x = self.x + i;
                     if x & 3 == plane {
-                        destination.lane::<1>(x, y, 1, |pixel| pixel.fill(|| texture.at(u, v)));
+                        destination
+                            .lane::<1>(x, self.y, 1, |pixel| pixel.fill(|| texture.at(u, v)));
                     }
                 }
             }
@@ -214,6 +254,7 @@ impl Coordinates {
     fn new(job: &Job, texture: &Texture<'_>) -> Self {
         match job.walk {
             Walk::Affine(walk) => Self::Affine(walk),
+            Walk::Wall(wall) => Self::Affine(wall.into()),
             Walk::Exact(walk) => Self::Exact(walk, (texture.width(), texture.height())),
             Walk::Linear(walk, pieces) => {
                 Self::Pieces(Steps::linear(walk, job.len, pieces, texture))

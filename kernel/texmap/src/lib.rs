@@ -17,12 +17,15 @@ pub mod coverage;
 pub mod exact;
 pub mod free;
 mod job;
+pub mod level;
 pub mod loops;
 mod mapper;
 pub mod plane;
 mod polygon;
 mod renderer;
 pub mod runs;
+mod straight;
+pub mod tiles;
 
 pub use job::{Job, JobList, Rows, Style, Walk};
 pub use mapper::{Face, Mapper};

@@ -8,7 +8,7 @@ use crate::job::{Job, Rows, Style, Walk};
 use crate::loops::Loop;
 use crate::plane::{self, Anchor, Plane};
 use crate::runs::Pieces;
-use crate::{Texture, Vertex};
+use crate::{Texture, Vertex, free, level, tiles};
 
 /// A face on the screen, as the mappers need it.
 #[derive(Clone, Copy, Debug)]
@@ -45,6 +45,14 @@ pub enum Mapper {
     Linear(Pieces),
     /// Quadratic pieces in each column.
     Quadratic(Pieces),
+    /// Linear pieces of 16 pixels, in columns or rows by which changes its depth less.
+    Nearer,
+    /// Affine in tiles of 16 x 16 pixels.
+    Tiles,
+    /// Affine along lines of constant depth, in any direction.
+    Free,
+    /// Affine where a column or row has one depth, otherwise exact.
+    Level,
 }
 
 /// A mapper's name, the mapper, and a line about it.
@@ -154,6 +162,26 @@ impl Mapper {
             "perspective; quadratic through three quotients of each column",
         ),
         (
+            "nearer",
+            Self::Nearer,
+            "perspective; as linear-16, in columns or rows by which changes its depth less",
+        ),
+        (
+            "tiles-16",
+            Self::Tiles,
+            "perspective; quotients at the corners of tiles of 16 x 16 pixels, affine inside",
+        ),
+        (
+            "free",
+            Self::Free,
+            "perspective; one division a line of constant depth, which goes any way",
+        ),
+        (
+            "level",
+            Self::Level,
+            "perspective; one division a column of a wall or row of a floor, otherwise exact",
+        ),
+        (
             "exact",
             Self::Exact,
             "perspective; a quotient for every pixel, rounded nowhere",
@@ -193,20 +221,15 @@ impl Mapper {
         texture: &Texture<'_>,
         mut sink: impl FnMut(Job),
     ) -> Result<(), Dropped> {
+        match self {
+            Self::Tiles => return tiles::jobs(face, texture, sink),
+            Self::Free => return free::jobs(face, texture, sink),
+            Self::Level => return level::jobs(face, texture, sink),
+            _ => {}
+        }
         let number = face.texture;
         let mut add = |axis, run: &Run, walk| {
-            let (x, y) = match axis {
-                Axis::Down => (run.line, run.first),
-                Axis::Right => (run.first, run.line),
-            };
-            sink(Job {
-                axis,
-                x,
-                y,
-                len: run.len,
-                texture: number,
-                walk,
-            });
+            sink(Job::new(axis, run.line, run.first, run.len, number, walk));
         };
         let polygon = face.polygon;
         let mut by_sides = |axis, rule: fn(&Sides, &Run) -> affine::Walk| {
@@ -222,14 +245,23 @@ impl Mapper {
             _ => {}
         }
         let plane = face.plane();
-        runs(Axis::Down, polygon, |run| {
-            let walk = plane::Walk::new(&plane, Axis::Down, run.line, run.first);
+        let axis = match self {
+            Self::Nearer if plane.c.right.abs() < plane.c.down.abs() => Axis::Right,
+            _ => Axis::Down,
+        };
+        runs(axis, polygon, |run| {
+            let (x, y) = match axis {
+                Axis::Down => (run.line, run.first),
+                Axis::Right => (run.first, run.line),
+            };
+            let walk = plane::Walk::new(&plane, axis, x, y);
             let walk = match self {
                 Self::Linear(pieces) => Walk::Linear(walk, pieces),
                 Self::Quadratic(pieces) => Walk::Quadratic(walk, pieces),
+                Self::Nearer => Walk::Linear(walk, Pieces::Of(16)),
                 _ => Walk::Exact(walk),
             };
-            add(Axis::Down, &run, walk);
+            add(axis, &run, walk);
         })
     }
 }
