@@ -169,3 +169,51 @@ pub(crate) fn jobs(
         }
     })
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+    use crate::straight::REACH;
+
+    #[test]
+    fn a_reciprocal_is_good_for_as_far_as_walks_reach() {
+        let seed = fastrand::u64(..);
+        std::println!("seed {seed}");
+        let mut random = fastrand::Rng::with_seed(seed);
+        for _ in 0..200_000 {
+            let bits = random.u32(0..54);
+            let c = random.i64(1..2 << bits);
+            let texels = random.i64(1..=4096);
+            let n = random.i128(-i128::from(c)..=c.into()) * i128::from(texels);
+            let n = n.clamp(-(1 << 62), 1 << 62) as i64;
+            let over = Reciprocal::new(c).unwrap();
+            // In eighths of the last place: rounded down, or to nearest, and an eighth of error.
+            let (eight, c) = (i128::from(n) << 19, i128::from(c));
+            let off = |at: i128| 8 * at * c - eight;
+            assert!((-9 * c..=c).contains(&off(over.times(n))), "{n} / {c}");
+            assert!(off(over.nearest(n)).abs() <= 5 * c, "{n} / {c}");
+        }
+        for c in [0, -1, i64::MIN] {
+            assert!(Reciprocal::new(c).is_none());
+        }
+    }
+
+    #[test]
+    fn a_walk_out_of_reach_is_none() {
+        let far = |a, c, step, len| {
+            let at = [a, 0, c];
+            let step = [step, 0];
+            Line { at, step }.straight(len).is_none()
+        };
+        let c = 1 << 40;
+        assert!(!far(4096 * c, c, 0, 1) && far(4096 * c + c / 1024, c, 0, 1));
+        assert!(!far(-4096 * c, c, 1024 * c, 9) && far(-4096 * c, c, 1024 * c, 10));
+        assert!(far(0, c, 8193 * c, 2) && !far(0, c, 8193 * c, 1));
+        // The widest forms over the least depth.
+        assert!(far(1 << 61, 1, 0, 1) && far(-(1 << 61), 1, 1 << 55, 320));
+        assert!(far(0, 1, i64::MAX, 2) && far(0, 1, i64::MIN, 2) && !far(0, 1, i64::MIN, 1));
+        assert_eq!(REACH, 4096 << 16);
+    }
+}
