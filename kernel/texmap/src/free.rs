@@ -19,11 +19,11 @@
 //!
 //! The line passes up to half a pixel beside the centres of its pixels, across it: down a column
 //! where it is nearer the horizontal. There u is a hyperbola, so the error is no larger than the
-//! larger of u's differences between the centre and the two places [`ASIDE`] of a pixel above and
-//! below it, plus what [`level::drift`] says for the pixel's number in its line. To first order that
-//! is half a pixel's worth of the texture's gradient across the line; it is reached. Where c is not
-//! above zero on a line, or its coordinates leave [`REACH`](crate::straight::REACH), its pixels are
-//! drawn exactly.
+//! larger of u's differences between the centre and the two places [`ASIDE`] above and below it,
+//! plus what [`level::drift`](crate::level::drift) says for the pixel's number in its line, and the
+//! last place of the forms for each pixel of it. To first order that is half a pixel's worth of the
+//! texture's gradient across the line; it is reached. Where c is not above zero on a line, or its
+//! coordinates go further than 4096 texels, its pixels are drawn exactly.
 
 use crate::coverage::{Axis, Dropped, MAX_RUNS, runs};
 use crate::job::{self, Job};
@@ -34,9 +34,9 @@ use modex::{HEIGHT, WIDTH};
 
 /// Fraction bits of a line's place aside: 320 steps leave it within 2^-14 pixel.
 const FRACTION: u32 = 22;
-/// Furthest that a line passes from a pixel's centre, in pixels: half of one, and what the steps
-/// of its place leave.
-pub const ASIDE: f64 = 0.5 + 1.0 / (1 << 14) as f64;
+/// Furthest that a line passes from a pixel's centre, in 2^-14 pixel: half of one, and what the
+/// steps of its place leave.
+pub const ASIDE: i32 = (1 << 13) + 1;
 /// Half a pixel.
 const HALF: i32 = 1 << (FRACTION - 1);
 /// Lines that meet the screen: one for each pixel of its first column, and one more for each

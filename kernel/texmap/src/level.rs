@@ -6,10 +6,8 @@
 //! coordinate only. Any other plane is left to the exact mapper's columns.
 //!
 //! Legal input: any face. Error against the quotient of the plane's integers, clamped into the
-//! texture: no more than [`drift`] says, and none where c is not above zero or the walk leaves
-//! [`REACH`], since such runs are exact.
-//!
-//! [`REACH`]: crate::straight::REACH
+//! texture: no more than [`drift`] says. Where c is not above zero, or the walk goes further than
+//! 4096 texels, the run is exact.
 
 use modex::Column;
 

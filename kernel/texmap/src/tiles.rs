@@ -8,7 +8,7 @@
 //! corners, and those of its pixels between these two. Every division by a length is a shift.
 //!
 //! Corners outside the polygon lie in its plane and may lie outside the texture. They are not
-//! clamped, since that would bend the tile; the walks are, by [`crate::straight`].
+//! clamped, since that would bend the tile; the walks are, where they step over the border.
 //!
 //! # Error
 //!
@@ -45,7 +45,7 @@ pub const DRIFT: i32 = 10;
 const CORNERS: usize = HEIGHT / SIDE as usize + 1;
 const _: () = assert!(WIDTH.is_multiple_of(SIDE as usize) && HEIGHT.is_multiple_of(SIDE as usize));
 
-/// u and v, 16.16 and within [`REACH`], and c, above zero.
+/// u and v, 16.16 and within `REACH`, and c, above zero.
 type Corner = [i64; 3];
 
 /// The corners left and right of a column of tiles, found when they are first asked for.

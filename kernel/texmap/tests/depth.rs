@@ -226,7 +226,8 @@ fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64
         Axis::Right => quotient(plane, k, x, y + by),
         Axis::Down => quotient(plane, k, x + by, y),
     };
-    let [one, other] = [moved(-free::ASIDE)?, moved(free::ASIDE)?];
+    let aside = f64::from(free::ASIDE) / 16384.0;
+    let [one, other] = [moved(-aside)?, moved(aside)?];
     Some((one - here).abs().max((other - here).abs()))
 }
 
