@@ -232,10 +232,13 @@ impl Mapper {
             sink(Job::new(axis, run.line, run.first, run.len, number, walk));
         };
         let polygon = face.polygon;
+        let drawn_by = self.style().affine;
         let mut by_sides = |axis, rule: fn(&Sides, &Run) -> affine::Walk| {
             let sides = Sides::new(polygon, texture, axis)?;
             runs(axis, polygon, |run| {
-                add(axis, &run, Walk::Affine(rule(&sides, &run)));
+                // The job has the walk that is drawn: its clear twin knows no loops.
+                let walk = drawn_by.walk(rule(&sides, &run));
+                add(axis, &run, Walk::Affine(walk));
             })
         };
         match self {

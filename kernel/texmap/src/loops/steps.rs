@@ -1,0 +1,284 @@
+//! What the loops keep in registers, how it is made of a walk, and how it steps: the portable
+//! twins.
+//!
+//! Each `next` gives the index of a pixel's texel and steps to the next pixel. Sums wrap: the step
+//! after the last pixel may lead anywhere.
+
+use crate::Texture;
+use crate::affine::Walk;
+
+/// A walk that is inside its texture at every pixel of a column: tested at both ends.
+#[derive(Clone, Copy)]
+pub(super) struct Inside<'t> {
+    texels: &'t [u8],
+    pitch: u16,
+    len: u16,
+    walk: Walk,
+}
+
+impl<'t> Inside<'t> {
+    /// `walk` over `len` pixels, at least one.
+    ///
+    /// # Panics
+    /// If it leaves the texture.
+    #[inline]
+    pub fn new(texture: &Texture<'t>, walk: Walk, len: u16) -> Self {
+        let steps = i64::from(len) - 1;
+        let inside = |at: i32, step: i32, size: u16| {
+            let (first, last) = (i64::from(at), i64::from(at) + steps * i64::from(step));
+            // Without a sign, what is below zero is above every size.
+            let size = u64::from(size) << 16;
+            (first as u64) < size && (last as u64) < size
+        };
+        assert!(
+            inside(walk.u, walk.du, texture.width()) && inside(walk.v, walk.dv, texture.height()),
+            "the walk leaves the texture"
+        );
+        Self {
+            texels: texture.texels(),
+            pitch: texture.pitch(),
+            len,
+            walk,
+        }
+    }
+
+    /// The first pixel's texel.
+    fn index(&self) -> usize {
+        let Walk { u, v, .. } = self.walk;
+        (v >> 16) as usize * usize::from(self.pitch) + (u >> 16) as usize
+    }
+
+    /// What every step adds to the index, carries apart. Rounded down: the fractions are positive
+    /// also where a step is negative, and every carry is one more.
+    fn whole_step(&self) -> isize {
+        let Walk { du, dv, .. } = self.walk;
+        (dv >> 16) as isize * self.pitch as isize + (du >> 16) as isize
+    }
+}
+
+/// The texel's index and the two fractions of the coordinates, 16 bits at the top of 32.
+pub(super) struct Address<'t> {
+    pub texels: &'t [u8],
+    /// For so many pixels, `at` is inside `texels`.
+    pub len: u16,
+    pub at: usize,
+    pub u: u32,
+    pub v: u32,
+    pub du: u32,
+    pub dv: u32,
+    /// What a step adds to the index if v carries, and if it does not.
+    pub steps: [isize; 2],
+}
+
+impl<'t> Address<'t> {
+    #[inline]
+    pub fn new(inside: Inside<'t>) -> Self {
+        let fraction = |at: i32| (at as u32) << 16;
+        let Walk { u, v, du, dv } = inside.walk;
+        let step = inside.whole_step();
+        Self {
+            texels: inside.texels,
+            len: inside.len,
+            at: inside.index(),
+            u: fraction(u),
+            v: fraction(v),
+            du: fraction(du),
+            dv: fraction(dv),
+            steps: [step + inside.pitch as isize, step],
+        }
+    }
+
+    pub fn next(&mut self) -> usize {
+        let at = self.at;
+        let (u, u_carry) = self.u.overflowing_add(self.du);
+        let (v, v_carry) = self.v.overflowing_add(self.dv);
+        (self.u, self.v) = (u, v);
+        let step = self.steps[usize::from(!v_carry)];
+        self.at = at.wrapping_add_signed(step + isize::from(u_carry));
+        at
+    }
+}
+
+/// The texel's index, and both fractions in one register: 16 bits of u at the top, 15 of v at the
+/// bottom, and between them a bit that takes the carry of v and is cleared every time.
+pub(super) struct Halves<'t> {
+    pub texels: &'t [u8],
+    /// For so many pixels, `at` is inside `texels`.
+    pub len: u16,
+    pub at: usize,
+    pub fractions: u32,
+    pub step_fractions: u32,
+    /// What every step adds to the index; a carry of u adds 1, one of v `pitch`.
+    pub step: isize,
+    pub pitch: isize,
+}
+
+impl<'t> Halves<'t> {
+    /// Where v takes its carry.
+    pub const CARRY: u32 = 1 << 15;
+
+    /// v and its step are even.
+    #[inline]
+    pub fn new(inside: Inside<'t>) -> Self {
+        let fractions = |u: i32, v: i32| (u as u32) << 16 | (v as u32 & 0xFFFF) >> 1;
+        let Walk { u, v, du, dv } = inside.walk;
+        Self {
+            texels: inside.texels,
+            len: inside.len,
+            at: inside.index(),
+            fractions: fractions(u, v),
+            step_fractions: fractions(du, dv),
+            step: inside.whole_step(),
+            pitch: inside.pitch as isize,
+        }
+    }
+
+    pub fn next(&mut self) -> usize {
+        let at = self.at;
+        let (fractions, u_carry) = self.fractions.overflowing_add(self.step_fractions);
+        let v_carry = fractions & Self::CARRY != 0;
+        self.fractions = fractions & !Self::CARRY;
+        let row = if v_carry { self.pitch } else { 0 };
+        self.at = at.wrapping_add_signed(self.step + isize::from(u_carry) + row);
+        at
+    }
+}
+
+/// The coordinates with the bits of the index at 16 and above: `u_mask` has those of the column,
+/// `v_mask` those of the row.
+pub(super) struct Pair<'t> {
+    /// As many as the masks together have bits for.
+    pub texels: &'t [u8],
+    pub u: u32,
+    pub v: u32,
+    pub du: u32,
+    pub dv: u32,
+    pub u_mask: u32,
+    pub v_mask: u32,
+}
+
+impl<'t> Pair<'t> {
+    /// `bits` are the texture's.
+    #[inline]
+    pub fn new(texture: &Texture<'t>, bits: (u32, u32), walk: Walk) -> Self {
+        let (columns, rows) = bits;
+        let texels = texture.texels();
+        debug_assert_eq!(texels.len(), 1 << (columns + rows));
+        // At most 8 bits each: v loses none of the 16 of its fraction and the 8 above.
+        Self {
+            texels,
+            u: walk.u as u32,
+            v: (walk.v as u32) << columns,
+            du: walk.du as u32,
+            dv: (walk.dv as u32) << columns,
+            u_mask: ((1 << columns) - 1) << 16,
+            v_mask: ((1 << rows) - 1) << (16 + columns),
+        }
+    }
+
+    pub fn next(&mut self) -> usize {
+        let index = ((self.v & self.v_mask) | (self.u & self.u_mask)) >> 16;
+        self.u = self.u.wrapping_add(self.du);
+        self.v = self.v.wrapping_add(self.dv);
+        index as usize
+    }
+}
+
+/// Both coordinates in one register, and a mask of the index's bits in it.
+///
+/// u lies at the bottom, and only the bits of it that are inside the padded texture: 16 of fraction
+/// and at most 8. A negative step is taken as the positive one that leads to the same column around
+/// the texture, so that nothing is ever borrowed. What u carries beyond its bits goes into the
+/// 16 free ones above it: a column of 65 535 pixels does not fill them. v lies above those, and
+/// what it carries leaves the register, or goes unmasked.
+pub(super) struct Joint<'t> {
+    /// As many as the mask has bits for.
+    pub texels: &'t [u8],
+    pub at: u64,
+    pub step: u64,
+    pub mask: u64,
+}
+
+impl<'t> Joint<'t> {
+    /// `bits` are the texture's.
+    #[inline]
+    pub fn new(texture: &Texture<'t>, bits: (u32, u32), walk: Walk) -> Self {
+        let (columns, rows) = bits;
+        let texels = texture.texels();
+        debug_assert_eq!(texels.len(), 1 << (columns + rows));
+        let u_bits = (1 << (16 + columns)) - 1;
+        let join =
+            |u: i32, v: i32| u64::from(v as u32) << (32 + columns) | u64::from(u as u32 & u_bits);
+        let columns_mask = ((1 << columns) - 1) << 16;
+        let rows_mask = ((1 << rows) - 1) << (48 + columns);
+        Self {
+            texels,
+            at: join(walk.u, walk.v),
+            step: join(walk.du, walk.dv),
+            mask: columns_mask | rows_mask,
+        }
+    }
+
+    pub fn next(&mut self) -> usize {
+        let index = self.at & self.mask;
+        self.at = self.at.wrapping_add(self.step);
+        // The row's bits are 32 above where they go on from the column's.
+        ((index >> 32 | index) as u32 >> 16) as usize
+    }
+}
+
+/// Two registers, each with the other's fraction: (fraction of u, row) and (fraction of v, column),
+/// 32 bits each. What carries out of the one is what the other's whole texels lack.
+///
+/// Of the two sums in a step the second's carry comes too late for the first, and waits for the
+/// next step. So v's fraction starts a step ahead, and the carry of that first step is kept.
+///
+/// A step's whole texels may be negative, and are added as one number with the fraction. In a walk
+/// inside its texture the sum's are not, so the fraction gets back exactly what it lent. But
+/// the *carry* is right only while the step as a whole is not negative, which it would be with
+/// a fraction of zero. Therefore each step's fraction is one part in 2^32 more than it ought to be.
+/// The 16 bits of the fraction don't notice within 65 535 pixels.
+pub(super) struct Crossed<'t> {
+    pub texels: &'t [u8],
+    /// For so many pixels, the index is inside `texels`.
+    pub len: u16,
+    /// Bits of a column's number.
+    pub columns: u32,
+    pub row: u64,
+    pub column: u64,
+    pub row_step: u64,
+    pub column_step: u64,
+    /// Of v's fraction.
+    pub carry: bool,
+}
+
+impl<'t> Crossed<'t> {
+    /// `bits` are the texture's.
+    #[inline]
+    pub fn new(inside: Inside<'t>, bits: (u32, u32)) -> Self {
+        let fraction = |at: i32| u64::from(at as u32 & 0xFFFF) << 48;
+        let whole = |at: i32| i64::from(at >> 16) as u64;
+        let one_part = 1 << 32;
+        let Walk { u, v, du, dv } = inside.walk;
+        let v_step = fraction(dv) + one_part;
+        let (v_ahead, carry) = fraction(v).overflowing_add(v_step);
+        Self {
+            texels: inside.texels,
+            len: inside.len,
+            columns: bits.0,
+            row: fraction(u) + whole(v),
+            column: v_ahead + whole(u),
+            row_step: (fraction(du) + one_part).wrapping_add(whole(dv)),
+            column_step: v_step.wrapping_add(whole(du)),
+            carry,
+        }
+    }
+
+    pub fn next(&mut self) -> usize {
+        let index = ((self.row as u32) << self.columns).wrapping_add(self.column as u32);
+        let (row, u_carry) = self.row.carrying_add(self.row_step, self.carry);
+        let (column, v_carry) = self.column.carrying_add(self.column_step, u_carry);
+        (self.row, self.column, self.carry) = (row, column, v_carry);
+        index as usize
+    }
+}

@@ -1,0 +1,357 @@
+//! The loops in x86-64 instructions. Why they may read without a check is told in [`super`].
+//!
+//! One frame serves all: the pixels that do not fill a block are drawn one by one, then blocks of
+//! [`BLOCK`], each store at a constant offset (chapter 58). One loop so draws any height, a column
+//! of one pixel included. Nothing in the frame changes the carry flag (LEA steps the address, DEC
+//! counts), so that a loop may keep it from pixel to pixel.
+//!
+//! Every function gets its registers' first values in a type of [`super::steps`], which was made
+//! of a walk that stays in the texture, or has masks that do.
+
+#![allow(unsafe_code)]
+
+use core::arch::asm;
+use core::arch::x86_64::{__cpuid, __cpuid_count};
+use core::sync::atomic::{AtomicU8, Ordering};
+
+use modex::{Column, STRIDE};
+
+use super::steps::{Address, Crossed, Halves, Joint, Pair};
+
+/// Pixels in a block.
+const BLOCK: u16 = 16;
+const _: () = assert!(STRIDE == 80, "the offsets in `down` are multiples of 80");
+
+/// The frame. `$first` prepares the flags; `$pixel!(offset)` is one pixel and its step: it stores
+/// to `{dest}` + offset, and may use what the operands after it name, but not ECX.
+macro_rules! down {
+    ($column:ident, $first:literal, $pixel:ident, $($operands:tt)*) => {{
+        let len = $column.len();
+        let dest = $column.as_ptr();
+        // SAFETY: the frame stores to the first byte of the column and to every 80th after it, as
+        // many as it has pixels: what `Lane::new` was promised. What `$pixel` reads are texels,
+        // by its caller's argument. The stack is not used.
+        unsafe {
+            asm!(
+                $first,
+                "jmp 3f",
+                "2:",
+                $pixel!("0"),
+                "lea {dest}, [{dest} + 80]",
+                "3:",
+                "dec ecx",
+                "jnz 2b",
+                "mov ecx, {blocks:e}",
+                "jmp 5f",
+                "4:",
+                $pixel!("0"),
+                $pixel!("80"),
+                $pixel!("160"),
+                $pixel!("240"),
+                $pixel!("320"),
+                $pixel!("400"),
+                $pixel!("480"),
+                $pixel!("560"),
+                $pixel!("640"),
+                $pixel!("720"),
+                $pixel!("800"),
+                $pixel!("880"),
+                $pixel!("960"),
+                $pixel!("1040"),
+                $pixel!("1120"),
+                $pixel!("1200"),
+                "lea {dest}, [{dest} + 1280]",
+                "5:",
+                "dec ecx",
+                "jnz 4b",
+                dest = inout(reg) dest => _,
+                blocks = in(reg) u32::from(len / BLOCK) + 1,
+                inout("ecx") u32::from(len % BLOCK) + 1 => _,
+                $($operands)*
+                options(nostack),
+            );
+        }
+    }};
+}
+
+/// The address and two fractions, each carry tested.
+#[inline]
+pub(super) fn two_carries(start: Address<'_>, mut column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "movzx {texel:e}, byte ptr [{at}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {at}, {step}\n",
+                "add {u:e}, {du:e}\n",
+                "jnc 6f\n",
+                "inc {at}\n",
+                "6:\n",
+                "add {v:e}, {dv:e}\n",
+                "jnc 7f\n",
+                "add {at}, {pitch}\n",
+                "7:",
+            )
+        };
+    }
+    debug_assert_eq!(start.len, column.len());
+    let at = start.texels.as_ptr().wrapping_add(start.at);
+    let [carried, step] = start.steps;
+    down!(column, "", pixel,
+        at = inout(reg) at => _,
+        u = inout(reg) start.u => _,
+        v = inout(reg) start.v => _,
+        du = in(reg) start.du,
+        dv = in(reg) start.dv,
+        step = in(reg) step,
+        pitch = in(reg) carried - step,
+        texel = out(reg) _,
+    );
+}
+
+/// Both fractions in one register: the carry of the upper goes out of it into the address, the
+/// lower's into a bit that is tested.
+#[inline]
+pub(super) fn packed(start: Halves<'_>, mut column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "movzx {texel:e}, byte ptr [{at}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {fractions:e}, {step_fractions:e}\n",
+                "adc {at}, {step}\n",
+                "test {fractions:e}, {carry}\n",
+                "jz 6f\n",
+                "add {at}, {pitch}\n",
+                "and {fractions:e}, {clear}\n",
+                "6:",
+            )
+        };
+    }
+    debug_assert_eq!(start.len, column.len());
+    let at = start.texels.as_ptr().wrapping_add(start.at);
+    down!(column, "", pixel,
+        at = inout(reg) at => _,
+        fractions = inout(reg) start.fractions => _,
+        step_fractions = in(reg) start.step_fractions,
+        step = in(reg) start.step,
+        pitch = in(reg) start.pitch,
+        texel = out(reg) _,
+        carry = const Halves::CARRY,
+        clear = const !Halves::CARRY as i32,
+    );
+}
+
+/// SBB makes 0 or -1 of v's carry, which picks the step; u's carry goes in with it.
+#[inline]
+pub(super) fn two_steps(start: Address<'_>, mut column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "movzx {texel:e}, byte ptr [{at}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {v:e}, {dv:e}\n",
+                "sbb {texel}, {texel}\n",
+                "add {u:e}, {du:e}\n",
+                "adc {at}, qword ptr [{steps} + {texel}*8 + 8]",
+            )
+        };
+    }
+    debug_assert_eq!(start.len, column.len());
+    let at = start.texels.as_ptr().wrapping_add(start.at);
+    down!(column, "", pixel,
+        at = inout(reg) at => _,
+        u = inout(reg) start.u => _,
+        v = inout(reg) start.v => _,
+        du = in(reg) start.du,
+        dv = in(reg) start.dv,
+        steps = in(reg) start.steps.as_ptr(),
+        texel = out(reg) _,
+    );
+}
+
+/// Two accumulators, a mask for each, one shift.
+#[inline]
+pub(super) fn shifts(start: Pair<'_>, mut column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "mov {texel:e}, {v:e}\n",
+                "and {texel:e}, {v_mask:e}\n",
+                "mov {columns:e}, {u:e}\n",
+                "and {columns:e}, {u_mask:e}\n",
+                "or {texel:e}, {columns:e}\n",
+                "shr {texel:e}, 16\n",
+                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {u:e}, {du:e}\n",
+                "add {v:e}, {dv:e}",
+            )
+        };
+    }
+    down!(column, "", pixel,
+        texels = in(reg) start.texels.as_ptr(),
+        u = inout(reg) start.u => _,
+        v = inout(reg) start.v => _,
+        du = in(reg) start.du,
+        dv = in(reg) start.dv,
+        u_mask = in(reg) start.u_mask,
+        v_mask = in(reg) start.v_mask,
+        texel = out(reg) _,
+        columns = out(reg) _,
+    );
+}
+
+/// One accumulator and one mask, the row's bits shifted down to the column's.
+#[inline]
+pub(super) fn joined(start: Joint<'_>, mut column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "mov {texel}, {at}\n",
+                "and {texel}, {mask}\n",
+                "mov {rows}, {texel}\n",
+                "shr {rows}, 32\n",
+                "or {texel:e}, {rows:e}\n",
+                "shr {texel:e}, 16\n",
+                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {at}, {step}",
+            )
+        };
+    }
+    down!(column, "", pixel,
+        texels = in(reg) start.texels.as_ptr(),
+        at = inout(reg) start.at => _,
+        step = in(reg) start.step,
+        mask = in(reg) start.mask,
+        texel = out(reg) _,
+        rows = out(reg) _,
+    );
+}
+
+/// The two registers cross their carries. How the row is scaled depends on the pitch, because no
+/// shift leaves the flags alone: by the scale of addresses, or by moving a byte.
+#[inline]
+pub(super) fn add_carry(start: Crossed<'_>, column: Column<'_>) {
+    macro_rules! crossed {
+        ($($index:literal),+) => {{
+            macro_rules! pixel {
+                ($offset:literal) => {
+                    concat!(
+                        $($index, "\n",)+
+                        "movzx eax, byte ptr [{texels} + rax]\n",
+                        "mov byte ptr [{dest} + ",
+                        $offset,
+                        "], al\n",
+                        "adc rdx, {row_step}\n",
+                        "adc {column}, {column_step}",
+                    )
+                };
+            }
+            let mut lane = column;
+            debug_assert_eq!(start.len, lane.len());
+            down!(lane, "bt {carry:e}, 0", pixel,
+                texels = in(reg) start.texels.as_ptr(),
+                inout("rdx") start.row => _,
+                column = inout(reg) start.column => _,
+                row_step = in(reg) start.row_step,
+                column_step = in(reg) start.column_step,
+                carry = in(reg) u32::from(start.carry),
+                out("rax") _,
+            );
+        }};
+    }
+    match start.columns {
+        0 => crossed!("mov eax, edx", "lea eax, [{column} + rax]"),
+        1 => crossed!("mov eax, edx", "lea eax, [{column} + rax*2]"),
+        2 => crossed!("mov eax, edx", "lea eax, [{column} + rax*4]"),
+        3 => crossed!("mov eax, edx", "lea eax, [{column} + rax*8]"),
+        4 => crossed!(
+            "mov eax, edx",
+            "lea eax, [rax + rax]",
+            "lea eax, [{column} + rax*8]"
+        ),
+        5 => crossed!(
+            "mov eax, edx",
+            "lea eax, [rax*4]",
+            "lea eax, [{column} + rax*8]"
+        ),
+        6 => crossed!(
+            "mov eax, edx",
+            "lea eax, [rax*8]",
+            "lea eax, [{column} + rax*8]"
+        ),
+        7 => crossed!(
+            "mov eax, edx",
+            "lea eax, [rax + rax]",
+            "lea eax, [rax*8]",
+            "lea eax, [{column} + rax*8]"
+        ),
+        _ => crossed!("mov eax, {column:e}", "mov ah, dl"),
+    }
+}
+
+/// One accumulator, and an instruction that gathers the bits of the index. The CPU must have it.
+#[inline]
+pub(super) fn extract(start: Joint<'_>, mut column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "pext {texel}, {at}, {mask}\n",
+                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {at}, {step}",
+            )
+        };
+    }
+    down!(column, "", pixel,
+        texels = in(reg) start.texels.as_ptr(),
+        at = inout(reg) start.at => _,
+        step = in(reg) start.step,
+        mask = in(reg) start.mask,
+        texel = out(reg) _,
+    );
+}
+
+/// Whether the CPU has BMI2, and with it PEXT. Asked once: CPUID is slow, under a hypervisor most
+/// of all.
+#[inline]
+pub(super) fn has_extract() -> bool {
+    const UNKNOWN: u8 = 0;
+    const NO: u8 = 1;
+    const YES: u8 = 2;
+    static EXTRACT: AtomicU8 = AtomicU8::new(UNKNOWN);
+
+    #[cold]
+    fn ask() -> u8 {
+        const FEATURES: u32 = 7;
+        const BMI2: u32 = 1 << 8;
+        let known = __cpuid(0).eax >= FEATURES;
+        let answer = if known && __cpuid_count(FEATURES, 0).ebx & BMI2 != 0 {
+            YES
+        } else {
+            NO
+        };
+        EXTRACT.store(answer, Ordering::Relaxed);
+        answer
+    }
+
+    let known = match EXTRACT.load(Ordering::Relaxed) {
+        UNKNOWN => ask(),
+        known => known,
+    };
+    known == YES
+}
