@@ -1,9 +1,9 @@
 //! The loops in x86-64 instructions. Why they may read without a check is told in [`super`].
 //!
-//! One frame serves all: the pixels that do not fill a block are drawn one by one, then blocks of
-//! [`BLOCK`], each store at a constant offset (chapter 58). One loop so draws any height, a column
-//! of one pixel included. Nothing in the frame changes the carry flag (LEA steps the address, DEC
-//! counts), so that a loop may keep it from pixel to pixel.
+//! One frame serves all: blocks of [`BLOCK`] pixels, each store at a constant offset (chapter 58).
+//! The first is entered where as many are left as do not fill blocks. One loop so draws any height,
+//! a column of one pixel included, with one jump that is hard to foresee. Nothing between pixels
+//! changes the carry flag (LEA steps the address, DEC counts): a loop may keep it.
 //!
 //! Every function gets its registers' first values in a type of [`super::steps`], which was made
 //! of a walk that stays in the texture, or has masks that do.
@@ -19,54 +19,84 @@ use modex::{Column, STRIDE};
 use super::steps::{Address, Crossed, Halves, Joint, Pair};
 
 /// Pixels in a block.
-const BLOCK: u16 = 16;
+const BLOCK: usize = 16;
 const _: () = assert!(STRIDE == 80, "the offsets in `down` are multiples of 80");
 
-/// The frame. `$first` prepares the flags; `$pixel!(offset)` is one pixel and its step: it stores
-/// to `{dest}` + offset, and may use what the operands after it name, but not ECX.
+/// The frame, for a column that is not empty. `$first` prepares the flags; `$pixel!(offset)` is one
+/// pixel and its step: it stores to `{dest}` + offset, and uses what the operands after it name.
 macro_rules! down {
     ($column:ident, $first:literal, $pixel:ident, $($operands:tt)*) => {{
-        let len = $column.len();
-        let dest = $column.as_ptr();
+        let len = usize::from($column.len());
+        // So many pixels of the first block are left out, as if the column began above its top.
+        let left_out = len.wrapping_neg() % BLOCK;
+        let dest = $column.as_ptr().wrapping_sub(left_out * STRIDE);
         // SAFETY: the frame stores to the first byte of the column and to every 80th after it, as
         // many as it has pixels: what `Lane::new` was promised. What `$pixel` reads are texels,
         // by its caller's argument. The stack is not used.
         unsafe {
             asm!(
+                "lea {entries}, [rip + 8f]",
+                "movsxd {entry}, dword ptr [{entries} + 4*{entry}]",
+                "add {entry}, {entries}",
                 $first,
-                "jmp 3f",
-                "2:",
+                "jmp {entry}",
+                ".p2align 2",
+                "8:",
+                ".long 20f - 8b",
+                ".long 21f - 8b",
+                ".long 22f - 8b",
+                ".long 23f - 8b",
+                ".long 24f - 8b",
+                ".long 25f - 8b",
+                ".long 26f - 8b",
+                ".long 27f - 8b",
+                ".long 28f - 8b",
+                ".long 29f - 8b",
+                ".long 30f - 8b",
+                ".long 31f - 8b",
+                ".long 32f - 8b",
+                ".long 33f - 8b",
+                ".long 34f - 8b",
+                ".long 35f - 8b",
+                "20:",
                 $pixel!("0"),
-                "lea {dest}, [{dest} + 80]",
-                "3:",
-                "dec ecx",
-                "jnz 2b",
-                "mov ecx, {blocks:e}",
-                "jmp 5f",
-                "4:",
-                $pixel!("0"),
+                "21:",
                 $pixel!("80"),
+                "22:",
                 $pixel!("160"),
+                "23:",
                 $pixel!("240"),
+                "24:",
                 $pixel!("320"),
+                "25:",
                 $pixel!("400"),
+                "26:",
                 $pixel!("480"),
+                "27:",
                 $pixel!("560"),
+                "28:",
                 $pixel!("640"),
+                "29:",
                 $pixel!("720"),
+                "30:",
                 $pixel!("800"),
+                "31:",
                 $pixel!("880"),
+                "32:",
                 $pixel!("960"),
+                "33:",
                 $pixel!("1040"),
+                "34:",
                 $pixel!("1120"),
+                "35:",
                 $pixel!("1200"),
                 "lea {dest}, [{dest} + 1280]",
-                "5:",
-                "dec ecx",
-                "jnz 4b",
+                "dec {blocks:e}",
+                "jnz 20b",
                 dest = inout(reg) dest => _,
-                blocks = in(reg) u32::from(len / BLOCK) + 1,
-                inout("ecx") u32::from(len % BLOCK) + 1 => _,
+                blocks = inout(reg) len.div_ceil(BLOCK) => _,
+                entry = inout(reg) left_out => _,
+                entries = out(reg) _,
                 $($operands)*
                 options(nostack),
             );

@@ -1,0 +1,145 @@
+//! The affine column loops alone: a picture of 320 columns of 200 pixels in RAM.
+//!
+//! `cargo bench -p texmap` times each with `divan`, then prints cycles a pixel, and what they are
+//! of the bare loop's in the same order and of the packed loop's in x order. Times are ratios
+//! within one run: the rounds go through all loops in turn, and a row has the medians.
+
+mod work;
+
+use modex::PlanarBuffer;
+use texmap::loops::Loop;
+use texmap::{Mapper, Rows};
+use work::{By, Order, PIXELS, draw, texels, texture};
+
+/// All that is timed.
+fn all() -> Vec<(By, Order)> {
+    let mut all = Vec::new();
+    for order in [Order::X, Order::Planes] {
+        all.push((By::Bare, order));
+        all.extend(Loop::ALL.map(|by| (By::Loop(by), order)));
+    }
+    all.extend([Rows::Multiply, Rows::Steps, Rows::Passes].map(|rows| (By::Rows(rows), Order::X)));
+    all
+}
+
+/// As the mappers are called.
+fn name(by: By) -> String {
+    match by {
+        By::Bare => "bare load and store".into(),
+        By::Loop(by) => Mapper::Affine(by).to_string(),
+        By::Rows(rows) => Mapper::Rows(rows).to_string(),
+    }
+}
+
+fn time(bencher: divan::Bencher<'_, '_>, by: By, order: Order) {
+    let texels = texels();
+    let texture = texture(&texels);
+    let mut page = PlanarBuffer::new();
+    bencher
+        .counter(divan::counter::ItemsCount::new(PIXELS))
+        .bench_local(|| draw(&mut page, &texture, divan::black_box(by), order));
+}
+
+/// Columns from left to right; rows in their own order.
+#[divan::bench(args = all().into_iter().filter(|a| a.1 == Order::X).map(|a| Named(a.0)))]
+fn x_order(bencher: divan::Bencher<'_, '_>, named: &Named) {
+    time(bencher, named.0, Order::X);
+}
+
+/// Columns plane by plane.
+#[divan::bench(args = all().into_iter().filter(|a| a.1 == Order::Planes).map(|a| Named(a.0)))]
+fn plane_order(bencher: divan::Bencher<'_, '_>, named: &Named) {
+    time(bencher, named.0, Order::Planes);
+}
+
+/// With a name for `divan`.
+struct Named(By);
+
+impl std::fmt::Display for Named {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&name(self.0))
+    }
+}
+
+fn main() {
+    divan::main();
+    // Without the flag `cargo bench` gives it is a test: that everything runs.
+    #[cfg(target_arch = "x86_64")]
+    if std::env::args().any(|arg| arg == "--bench") {
+        cycles::table();
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod cycles {
+    use super::*;
+    use std::arch::x86_64::{_mm_lfence, _rdtsc};
+
+    /// Many and short: other programs spoil few of them.
+    const ROUNDS: usize = 401;
+
+    /// The time stamp, all before it done.
+    fn now() -> u64 {
+        // SAFETY: every x86-64 CPU has SSE2.
+        unsafe { _mm_lfence() };
+        // SAFETY: as has it the counter; a system that forbids it would fault.
+        unsafe { _rdtsc() }
+    }
+
+    /// Medians of cycles a pixel, with the spread of the middle half.
+    pub fn table() {
+        let texels = texels();
+        let texture = texture(&texels);
+        let mut page = PlanarBuffer::new();
+        let all = all();
+        let mut cycles = vec![Vec::new(); all.len()];
+        for _ in 0..ROUNDS {
+            for (&(by, order), cycles) in all.iter().zip(&mut cycles) {
+                draw(&mut page, &texture, by, order);
+                let start = now();
+                draw(&mut page, &texture, by, order);
+                let taken = now() - start;
+                cycles.push(taken as f64 / f64::from(PIXELS));
+            }
+        }
+        for cycles in &mut cycles {
+            cycles.sort_by(f64::total_cmp);
+        }
+        let median = |by, order| {
+            let at = all.iter().position(|&other| other == (by, order));
+            at.map_or(f64::NAN, |at| cycles[at][ROUNDS / 2])
+        };
+        let packed = median(By::Loop(Loop::Packed), Order::X);
+        println!(
+            "\ncycles a pixel, median of {ROUNDS} (middle half); of the bare loop's in the same order; packed in x order is so many times slower"
+        );
+        for (&(by, order), cycles) in all.iter().zip(&cycles) {
+            let (low, middle, high) = (
+                cycles[ROUNDS / 4],
+                cycles[ROUNDS / 2],
+                cycles[ROUNDS * 3 / 4],
+            );
+            println!(
+                "{:<20} {:<7} {middle:5.2} ({low:.2} to {high:.2}) {:5.2} {:5.2}{}",
+                name(by),
+                format!("{order:?}"),
+                middle / median(By::Bare, order),
+                packed / middle,
+                match by {
+                    By::Loop(by) if !by.is_tuned_here() => " (portable)",
+                    _ => "",
+                },
+            );
+        }
+        let best = Loop::ALL
+            .map(|by| median(By::Loop(by), Order::Planes))
+            .into_iter()
+            .fold(f64::INFINITY, f64::min);
+        println!(
+            "the best loop plane by plane: {:.2} of the bare loop; packed in x order takes {:.2} times as long, row-multiply {:.2} times",
+            best / median(By::Bare, Order::Planes),
+            packed / best,
+            median(By::Rows(Rows::Multiply), Order::X) / best,
+        );
+    }
+}

@@ -1,0 +1,178 @@
+//! What is measured: columns of a texture at an angle, drawn into a page in RAM in two orders, and
+//! the loop that can't be beaten.
+
+use modex::{Column, Destination, PlanarBuffer};
+use texmap::affine::Walk;
+use texmap::coverage::Axis;
+use texmap::loops::Loop;
+use texmap::{Job, Rows, Style, Texture};
+
+/// Columns of the picture.
+pub const COLUMNS: u16 = 320;
+/// Pixels in each.
+pub const LEN: u16 = 200;
+/// Pixels of the picture.
+pub const PIXELS: u32 = COLUMNS as u32 * LEN as u32;
+
+/// Texels across and down the texture.
+const SIDE: u16 = 64;
+
+/// Its texels.
+pub fn texels() -> Vec<u8> {
+    (0..u32::from(SIDE).pow(2))
+        .map(|i| (i.wrapping_mul(0x9E37_79B1) >> 24) as u8)
+        .collect()
+}
+
+/// The texture.
+pub fn texture(texels: &[u8]) -> Texture<'_> {
+    Texture::padded(texels, SIDE, SIDE).expect("SIDE x SIDE texels")
+}
+
+/// Steps of 0.20 and 0.27 texel a pixel: the picture lies aslant in the texture and almost fills it.
+const STEPS: (i32, i32) = (6_600, 8_820);
+
+/// The walk down column `x`.
+pub fn down(x: u16) -> Walk {
+    let (x, (du, dv)) = (i32::from(x), STEPS);
+    Walk {
+        u: 0x1_0000 + x * dv,
+        v: 0x1_8000 + (i32::from(COLUMNS) - x) * du,
+        du,
+        dv,
+    }
+}
+
+/// The walk along row `y` of the same picture.
+pub fn along(y: u16) -> Walk {
+    let (first, y, (du, dv)) = (down(0), i32::from(y), STEPS);
+    Walk {
+        u: first.u + y * du,
+        v: first.v + y * dv,
+        du: dv,
+        dv: -du,
+    }
+}
+
+/// In which order the columns come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// From left to right.
+    X,
+    /// All of plane 0, then of 1, 2 and 3.
+    Planes,
+}
+
+impl Order {
+    /// The columns in this order.
+    fn columns(self) -> impl Iterator<Item = u16> {
+        let (planes, columns, step) = match self {
+            Self::X => (1, COLUMNS, 1),
+            Self::Planes => (4, COLUMNS / 4, 4),
+        };
+        (0..planes).flat_map(move |plane| (0..columns).map(move |i| plane + i * step))
+    }
+}
+
+/// What draws the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum By {
+    /// Loads a texel and stores it, and steps nothing.
+    Bare,
+    /// A loop for columns.
+    Loop(Loop),
+    /// A mapper of rows; it has an order of its own.
+    Rows(Rows),
+}
+
+/// Draws the picture.
+pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order) {
+    match by {
+        By::Bare => {
+            for x in order.columns() {
+                page.column(x, 0, LEN, |column| bare(texture.texels(), column));
+            }
+        }
+        By::Loop(by) => {
+            for x in order.columns() {
+                page.column(x, 0, LEN, |column| by.column(texture, down(x), column));
+            }
+        }
+        By::Rows(rows) => {
+            let style = Style {
+                rows,
+                ..Style::default()
+            };
+            for y in 0..LEN {
+                let row = Job {
+                    axis: Axis::Right,
+                    x: 0,
+                    y,
+                    len: COLUMNS,
+                    texture: 0,
+                    walk: texmap::Walk::Affine(along(y)),
+                };
+                row.draw(style, texture, page);
+            }
+        }
+    }
+}
+
+/// A load and a store for every pixel, 16 times unrolled: the floor.
+///
+/// # Panics
+/// If there are not 16 texels.
+pub fn bare(texels: &[u8], mut column: Column<'_>) {
+    let texels = &texels[..16];
+    let len = column.len();
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::asm;
+        /// A block's loads and stores.
+        macro_rules! block {
+            ($($load:literal $store:literal),*) => {
+                concat!($(
+                    "movzx {texel:e}, byte ptr [{texels} + ", $load, "]\n",
+                    "mov byte ptr [{dest} + ", $store, "], {texel:l}\n",
+                )*)
+            };
+        }
+        // SAFETY: the loads are inside the 16 texels; the stores are the column's pixels, as
+        // `Lane::new` was promised. The stack is not used.
+        unsafe {
+            asm!(
+                "jmp 3f",
+                "2:",
+                block!("0" "0"),
+                "lea {dest}, [{dest} + 80]",
+                "3:",
+                "dec {odd:e}",
+                "jnz 2b",
+                "jmp 5f",
+                "4:",
+                block!(
+                    "0" "0", "1" "80", "2" "160", "3" "240",
+                    "4" "320", "5" "400", "6" "480", "7" "560",
+                    "8" "640", "9" "720", "10" "800", "11" "880",
+                    "12" "960", "13" "1040", "14" "1120", "15" "1200"
+                ),
+                "lea {dest}, [{dest} + 1280]",
+                "5:",
+                "dec {blocks:e}",
+                "jnz 4b",
+                dest = inout(reg) column.as_ptr() => _,
+                odd = inout(reg) u32::from(len % 16) + 1 => _,
+                blocks = inout(reg) u32::from(len / 16) + 1 => _,
+                texels = in(reg) texels.as_ptr(),
+                texel = out(reg) _,
+                options(nostack),
+            );
+        }
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    {
+        let _ = len;
+        let mut texels = texels.iter().cycle();
+        column.fill(|| texels.next().copied().unwrap_or_default());
+    }
+}
