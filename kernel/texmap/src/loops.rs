@@ -144,13 +144,13 @@ impl Loop {
             (Self::TwoCarries, _) => tuned::two_carries(Address::new(inside()), column),
             (Self::Packed, _) => tuned::packed(Halves::new(inside()), column),
             (Self::TwoSteps, _) => tuned::two_steps(Address::new(inside()), column),
-            (Self::Shifts, Some(bits)) => tuned::shifts(Pair::new(texture, bits, walk), column),
-            (Self::Joined, Some(bits)) => tuned::joined(Joint::new(texture, bits, walk), column),
+            (Self::Shifts, Some(_)) => tuned::shifts(Pair::new(texture, walk), column),
+            (Self::Joined, Some(_)) => tuned::joined(Joint::new(texture, walk), column),
             (Self::AddCarry, Some(bits)) => {
                 tuned::add_carry(Crossed::new(inside(), bits), column);
             }
-            (Self::Extract, Some(bits)) if tuned::has_extract() => {
-                tuned::extract(Joint::new(texture, bits, walk), column);
+            (Self::Extract, Some(_)) if tuned::has_extract() => {
+                tuned::extract(Joint::new(texture, walk), column);
             }
             (Self::Extract, Some(_)) => self.portable(texture, walk, column),
             (_, None) | (Self::Multiply, _) => affine::column(texture, walk, column),
@@ -178,12 +178,12 @@ impl Loop {
                 let mut halves = Halves::new(inside());
                 column.fill(|| texels[halves.next()]);
             }
-            (Self::Shifts, Some(bits)) => {
-                let mut pair = Pair::new(texture, bits, walk);
+            (Self::Shifts, Some(_)) => {
+                let mut pair = Pair::new(texture, walk);
                 column.fill(|| texels[pair.next()]);
             }
-            (Self::Joined | Self::Extract, Some(bits)) => {
-                let mut joint = Joint::new(texture, bits, walk);
+            (Self::Joined | Self::Extract, Some(_)) => {
+                let mut joint = Joint::new(texture, walk);
                 column.fill(|| texels[joint.next()]);
             }
             (Self::AddCarry, Some(bits)) => {

@@ -155,9 +155,10 @@ impl<'a> Texture<'a> {
 
     /// In a padded texture, the bits of a column's number and of a row's.
     pub fn bits(&self) -> Option<(u32, u32)> {
-        let rows = self.texels.len() / usize::from(self.pitch);
-        let powers = self.pitch.is_power_of_two() && rows.is_power_of_two();
-        powers.then(|| (self.pitch.trailing_zeros(), rows.trailing_zeros()))
+        // Asked for every column: there are `pitch` x rows texels, and no division tells it.
+        let powers = self.pitch.is_power_of_two() && self.texels.len().is_power_of_two();
+        let columns = self.pitch.trailing_zeros();
+        powers.then(|| (columns, self.texels.len().trailing_zeros() - columns))
     }
 
     /// The texel at coordinates inside the texture, 16.16.

@@ -158,21 +158,21 @@ pub(super) struct Pair<'t> {
 }
 
 impl<'t> Pair<'t> {
-    /// `bits` are the texture's.
+    /// The texture is padded.
     #[inline]
-    pub fn new(texture: &Texture<'t>, bits: (u32, u32), walk: Walk) -> Self {
-        let (columns, rows) = bits;
+    pub fn new(texture: &Texture<'t>, walk: Walk) -> Self {
+        debug_assert!(texture.bits().is_some());
         let texels = texture.texels();
-        debug_assert_eq!(texels.len(), 1 << (columns + rows));
+        let pitch = u32::from(texture.pitch());
         // At most 8 bits each: v loses none of the 16 of its fraction and the 8 above.
         Self {
             texels,
             u: walk.u as u32,
-            v: (walk.v as u32) << columns,
+            v: (walk.v as u32).wrapping_mul(pitch),
             du: walk.du as u32,
-            dv: (walk.dv as u32) << columns,
-            u_mask: ((1 << columns) - 1) << 16,
-            v_mask: ((1 << rows) - 1) << (16 + columns),
+            dv: (walk.dv as u32).wrapping_mul(pitch),
+            u_mask: (pitch - 1) << 16,
+            v_mask: (texels.len() as u32 - pitch) << 16,
         }
     }
 
@@ -200,22 +200,20 @@ pub(super) struct Joint<'t> {
 }
 
 impl<'t> Joint<'t> {
-    /// `bits` are the texture's.
+    /// The texture is padded.
     #[inline]
-    pub fn new(texture: &Texture<'t>, bits: (u32, u32), walk: Walk) -> Self {
-        let (columns, rows) = bits;
+    pub fn new(texture: &Texture<'t>, walk: Walk) -> Self {
+        debug_assert!(texture.bits().is_some());
         let texels = texture.texels();
-        debug_assert_eq!(texels.len(), 1 << (columns + rows));
-        let u_bits = (1 << (16 + columns)) - 1;
+        let pitch = u64::from(texture.pitch());
+        let around = (pitch << 16) - 1;
         let join =
-            |u: i32, v: i32| u64::from(v as u32) << (32 + columns) | u64::from(u as u32 & u_bits);
-        let columns_mask = ((1 << columns) - 1) << 16;
-        let rows_mask = ((1 << rows) - 1) << (48 + columns);
+            |u: i32, v: i32| (u64::from(v as u32) * pitch) << 32 | u64::from(u as u32) & around;
         Self {
             texels,
             at: join(walk.u, walk.v),
             step: join(walk.du, walk.dv),
-            mask: columns_mask | rows_mask,
+            mask: (texels.len() as u64 - pitch) << 48 | (pitch - 1) << 16,
         }
     }
 
