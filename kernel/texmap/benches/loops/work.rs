@@ -15,7 +15,7 @@ pub const LEN: u16 = 200;
 pub const PIXELS: u32 = COLUMNS as u32 * LEN as u32;
 
 /// Texels across and down the texture.
-const SIDE: u16 = 64;
+const SIDE: u16 = 128;
 
 /// Its texels.
 pub fn texels() -> Vec<u8> {
@@ -30,7 +30,7 @@ pub fn texture(texels: &[u8]) -> Texture<'_> {
 }
 
 /// Steps of 0.20 and 0.27 texel a pixel: the picture lies aslant in the texture and almost fills it.
-const STEPS: (i32, i32) = (6_600, 8_820);
+const STEPS: (i32, i32) = (13_235, 17_695);
 
 /// The walk down column `x`.
 pub fn down(x: u16) -> Walk {
