@@ -387,6 +387,21 @@ fn the_longest_column_spills_nothing() {
 }
 
 #[test]
+fn the_bits_of_a_texture_are_those_of_its_padded_sides() {
+    let texels = [1; 256 * 256];
+    for (size, padded, bits) in [
+        ((1, 1), false, Some((0, 0))),
+        ((64, 32), false, Some((6, 5))),
+        ((64, 33), false, None),
+        ((48, 32), false, None),
+        ((48, 33), true, Some((6, 6))),
+        ((3, 256), true, Some((2, 8))),
+    ] {
+        assert_eq!(texture(&texels, size, padded).bits(), bits, "{size:?}");
+    }
+}
+
+#[test]
 fn an_empty_column_is_not_drawn() {
     let mut byte = UNTOUCHED;
     for by in Loop::ALL {
