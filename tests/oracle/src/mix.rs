@@ -87,9 +87,8 @@ impl Mix {
 
     /// Case `number` of this mix.
     pub fn case(self, seed: u64, number: u64) -> Case {
-        let stream = scramble(scramble(seed ^ scramble(self as u64)) ^ number);
         let mut draw = Draw {
-            random: Rng::with_seed(stream),
+            random: stream(seed, self as u64, number),
         };
         let polygon = match self {
             Self::Centres => draw.centres(),
@@ -113,6 +112,11 @@ impl Mix {
             outline: None,
         }
     }
+}
+
+/// The random numbers of a case. No two kinds of cases have the same `mix`.
+pub(crate) fn stream(seed: u64, mix: u64, number: u64) -> Rng {
+    Rng::with_seed(scramble(scramble(seed ^ scramble(mix)) ^ number))
 }
 
 /// The finaliser of splitmix64: neighbouring numbers give unrelated ones.

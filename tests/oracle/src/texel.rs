@@ -2,6 +2,7 @@
 //! down the column; with perspective, the floor of a quotient.
 
 use texmap::Vertex;
+use texmap::plane::Anchor;
 
 /// A coordinate as a quotient, in 16.16 texels; the divisor is above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,4 +100,42 @@ pub fn perspective(n: i128, c: i128, size: u16) -> u16 {
         (false, false) => last,
     };
     texel as u16
+}
+
+/// The three forms of the plane through `anchors` at the centre of a pixel: u = a / c and v = b / c
+/// in texels, as they are before anything is cut. Each anchor weighs what the ray's volume with the
+/// other two is.
+///
+/// Positions are within 2^24: a product of two is below 2^49 in each part, a weight below 2^61, a
+/// form below 2^92 (the focal length is at most 2^15).
+pub fn forms(anchors: &[Anchor; 3], focal_length: i32, x: u16, y: u16) -> [i128; 3] {
+    let ray = [
+        2 * i128::from(x) - 319,
+        2 * i128::from(y) - 239,
+        2 * i128::from(focal_length),
+    ];
+    let mut forms = [0; 3];
+    let mut volume = 0;
+    for i in 0..3 {
+        let [p, q] = [1, 2].map(|k| anchors[(i + k) % 3].position.map(i128::from));
+        let normal = cross(p, q);
+        let weight = dot(ray, normal);
+        volume = dot(anchors[i].position.map(i128::from), normal);
+        let factors = [i128::from(anchors[i].u), i128::from(anchors[i].v), 1 << 16];
+        for (form, factor) in forms.iter_mut().zip(factors) {
+            *form += factor * weight;
+        }
+    }
+    forms.map(|form| if volume < 0 { -form } else { form })
+}
+
+pub(crate) fn cross(p: [i128; 3], q: [i128; 3]) -> [i128; 3] {
+    [0, 1, 2].map(|k| {
+        let (l, m) = ((k + 1) % 3, (k + 2) % 3);
+        p[l] * q[m] - p[m] * q[l]
+    })
+}
+
+pub(crate) fn dot(p: [i128; 3], q: [i128; 3]) -> i128 {
+    (0..3).map(|k| p[k] * q[k]).sum()
 }

@@ -1,0 +1,361 @@
+//! The exact mapper against its definition, on random planes of a texture.
+//!
+//! As in [`crate::mix`], a case depends on the seed, its mix and its number alone.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use fastrand::Rng;
+use modex::{Destination, PlanarBuffer};
+use texmap::coverage::Axis;
+use texmap::plane::{Anchor, Form, MAX_POSITION, Plane, ROUNDING, Walk};
+use texmap::{Texture, exact};
+
+use crate::mix::stream;
+use crate::texel::{forms, perspective};
+
+/// The camera's: cases are as it sees them.
+pub use scene::FOCAL_LENGTH;
+
+/// Columns drawn of each plane: making one takes as long as drawing some.
+const COLUMNS: usize = 8;
+
+/// A kind of planes. Each keeps what its name promises in every case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mix {
+    /// From the near plane to 256 units, in one polygon.
+    Deep,
+    /// Within a unit of the eye.
+    Near,
+    /// Within 1/16 unit of the eye.
+    Nearest,
+    /// Facing the eye, with whole texels at pixels' centres: quotients that are whole numbers.
+    Ties,
+    /// Through the eye, or no plane at all: three points on a line, or one point.
+    ThroughEye,
+    /// From behind the eye to before it.
+    AcrossEye,
+    /// All of it behind the eye.
+    BehindEye,
+}
+
+impl Mix {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Deep,
+        Self::Near,
+        Self::Nearest,
+        Self::Ties,
+        Self::ThroughEye,
+        Self::AcrossEye,
+        Self::BehindEye,
+    ];
+
+    /// What it is called in the tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Deep => "to 256 units",
+            Self::Near => "within a unit",
+            Self::Nearest => "within 1/16 unit",
+            Self::Ties => "whole texels on centres",
+            Self::ThroughEye => "through the eye",
+            Self::AcrossEye => "across the eye",
+            Self::BehindEye => "behind the eye",
+        }
+    }
+
+    /// Case `number` of this mix.
+    pub fn case(self, seed: u64, number: u64) -> Case {
+        let mut random = stream(seed, 32 + self as u64, number);
+        let random = &mut random;
+        let size = (side(random), side(random));
+        // Bits of the furthest z.
+        let deepest = match self {
+            Self::Deep => 24,
+            Self::Near => 16,
+            Self::Nearest => 12,
+            _ => random.choice([24, 16, 12]).unwrap(),
+        };
+        let mut anchors = [(); 3].map(|()| anchor(random, 7, deepest, size));
+        match self {
+            Self::Deep | Self::Near | Self::Nearest => {}
+            Self::Ties => anchors = facing(random, size),
+            Self::ThroughEye => match random.u8(0..3) {
+                0 => anchors[2].position = [0; 3],
+                1 => anchors[2].position = anchors[1].position,
+                _ => anchors = [anchors[0]; 3],
+            },
+            Self::AcrossEye => anchors[0].position = anchors[0].position.map(|k| -k),
+            Self::BehindEye => {
+                for anchor in &mut anchors {
+                    anchor.position[2] = -anchor.position[2];
+                }
+            }
+        }
+        let columns = [(); COLUMNS].map(|()| {
+            let (x, y) = (random.u16(0..320), random.u16(0..240));
+            (x, y, random.u16(1..=240 - y))
+        });
+        Case {
+            anchors,
+            size,
+            columns: columns.to_vec(),
+        }
+    }
+}
+
+/// A side of a texture: powers of two and not, single texels, the largest, any.
+fn side(random: &mut Rng) -> u16 {
+    match random.u8(0..4) {
+        0 => random.u16(1..=4),
+        1 => 1 << random.u16(0..=8),
+        _ => random.u16(1..=256),
+    }
+}
+
+/// A point that the screen, or its neighbourhood, shows, its z of so many bits.
+pub fn anchor(random: &mut Rng, nearest: u32, deepest: u32, (w, h): (u16, u16)) -> Anchor {
+    let bits = random.u32(nearest..deepest);
+    let z = random.i32(1 << bits..2 << bits).min(MAX_POSITION);
+    let at = |random: &mut Rng, reach: i64| {
+        let pixel = random.i64(-reach..=reach);
+        let limit = i64::from(MAX_POSITION);
+        (pixel * i64::from(z) / i64::from(FOCAL_LENGTH)).clamp(-limit, limit) as i32
+    };
+    Anchor {
+        position: [at(random, 400), at(random, 300), z],
+        u: random.i32(0..=i32::from(w) << 16),
+        v: random.i32(0..=i32::from(h) << 16),
+    }
+}
+
+/// A rectangle's corner and the next two, all on pixels' centres and at whole texels. The scale is
+/// a power of two, so that cutting the plane rounds nothing and the ties stay ties.
+fn facing(random: &mut Rng, (w, h): (u16, u16)) -> [Anchor; 3] {
+    let scale = 1 << random.u32(0..=12);
+    let (x, y) = (random.i32(0..320), random.i32(0..240));
+    // A texel is as wide as some pixels, or as high.
+    let mut away = || random.choice([-1, 1]).unwrap() << random.u32(3..=8);
+    let (across, down) = (away(), away());
+    let mut anchor = |x: i32, y: i32| Anchor {
+        position: [2 * x - 319, 2 * y - 239, 2 * FOCAL_LENGTH].map(|k| k * scale),
+        u: random.i32(0..=w.into()) << 16,
+        v: random.i32(0..=h.into()) << 16,
+    };
+    [anchor(x, y), anchor(x + across, y), anchor(x, y + down)]
+}
+
+/// What a case consists of: a plane, a texture's size, and columns of the screen as x, y, length.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// The plane.
+    pub anchors: [Anchor; 3],
+    /// Texels across and down.
+    pub size: (u16, u16),
+    /// What is drawn.
+    pub columns: Vec<(u16, u16, u16)>,
+}
+
+impl Case {
+    /// What is left of a case that fails: its first column that does.
+    pub fn shrink(&self, checker: &mut Checker) -> Self {
+        let alone = self.columns.iter().map(|&column| Self {
+            columns: vec![column],
+            ..self.clone()
+        });
+        let failing = { alone }.find(|case| checker.case(case).is_err());
+        failing.unwrap_or_else(|| self.clone())
+    }
+
+    /// A test with the case, for `kernel/texmap/tests/exact.rs`; `from` says where it was found.
+    pub fn source(&self, wrong: &Wrong, from: impl fmt::Display) -> String {
+        let Self {
+            anchors,
+            size,
+            columns,
+        } = self;
+        let [a, b, c] = anchors;
+        format!(
+            "/// {wrong}. Found by {from}.\n#[test]\nfn found_by_a_sweep() {{\n    \
+             use oracle::plane::{{Case, Checker}};\n    \
+             let case = Case {{\n        anchors: [\n            {a:?},\n            {b:?},\n            \
+             {c:?},\n        ],\n        size: {size:?},\n        columns: vec!{columns:?},\n    }};\n    \
+             assert_eq!(Checker::default().case(&case).err(), None);\n}}\n"
+        )
+    }
+}
+
+/// What is wrong with a case.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// The mapper panicked.
+    Panicked,
+    /// A form is further than [`ROUNDING`] from the real one.
+    Cut,
+    /// The mapper read another texel than the floor of the quotient.
+    Texel {
+        /// The pixel's column.
+        x: u16,
+        /// The pixel's row.
+        y: u16,
+        /// Whether it is the texel's place across or down.
+        down: bool,
+        /// What the definition says.
+        expected: u16,
+        /// What the mapper read.
+        found: u16,
+    },
+}
+
+impl fmt::Display for Wrong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Panicked => write!(f, "the mapper panicked"),
+            Self::Cut => write!(f, "cutting the plane moved a form by more than its bound"),
+            Self::Texel {
+                x,
+                y,
+                down,
+                expected,
+                found,
+            } => {
+                let axis = if *down { "down" } else { "across" };
+                write!(
+                    f,
+                    "({x}, {y}) reads texel {found} {axis}, and the floor is {expected}"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for Wrong {}
+
+/// What was compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Compared {
+    /// Pixels, each with both of its coordinates.
+    pub samples: u64,
+    /// Those of them where a coordinate is outside the texture.
+    pub clamped: u64,
+    /// Those of them where a coordinate inside it is a whole number.
+    pub ties: u64,
+}
+
+/// Checks cases; it has the memory for that.
+#[derive(Debug)]
+pub struct Checker {
+    page: Box<PlanarBuffer>,
+    /// By width: texels that tell their column, and texels that tell their row, 256 rows of each.
+    axes: Vec<[Vec<u8>; 2]>,
+}
+
+impl Default for Checker {
+    fn default() -> Self {
+        Self {
+            page: Box::new(PlanarBuffer::new()),
+            axes: vec![Default::default(); usize::from(Texture::MAX_SIDE) + 1],
+        }
+    }
+}
+
+impl Checker {
+    /// Checks a case, and says what was compared.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn case(&mut self, case: &Case) -> Result<Compared, Wrong> {
+        // A panic is a failure like another, to be printed.
+        catch_unwind(AssertUnwindSafe(|| self.columns(case))).unwrap_or(Err(Wrong::Panicked))
+    }
+
+    fn columns(&mut self, case: &Case) -> Result<Compared, Wrong> {
+        let plane = Plane::new(&case.anchors, FOCAL_LENGTH);
+        if !is_cut_by_one_shift(case, &plane) {
+            return Err(Wrong::Cut);
+        }
+        let mut compared = Compared::default();
+        for &column in &case.columns {
+            let more = self.column(case, &plane, column)?;
+            compared.samples += more.samples;
+            compared.clamped += more.clamped;
+            compared.ties += more.ties;
+        }
+        Ok(compared)
+    }
+
+    fn column(
+        &mut self,
+        case: &Case,
+        plane: &Plane,
+        (x, y, len): (u16, u16, u16),
+    ) -> Result<Compared, Wrong> {
+        let (w, h) = case.size;
+        let axes = &mut self.axes[usize::from(w)];
+        if axes[0].is_empty() {
+            let texels = |of: fn(u16, u16) -> u16| -> Vec<u8> {
+                let rows = 0..Texture::MAX_SIDE;
+                let texels = rows.flat_map(|j| (0..w).map(move |i| of(i, j) as u8));
+                texels.collect()
+            };
+            *axes = [texels(|i, _| i), texels(|_, j| j)];
+        }
+        let mut marks = [(false, false); 240];
+        for (down, (form, size)) in [(false, (plane.a, w)), (true, (plane.b, h))] {
+            let texels = &axes[usize::from(down)][..usize::from(w) * usize::from(h)];
+            let texture = Texture::new(texels, w, h).expect("a legal size");
+            let walk = Walk::new(plane, Axis::Down, x, y);
+            self.page.column(x, y, len, |column| {
+                exact::column(&texture, walk, len, column)
+            });
+            for (y, (clamped, tied)) in (y..y + len).zip(&mut marks) {
+                let (n, c) = (at(&form, x, y), at(&plane.c, x, y));
+                let expected = perspective(n, c, size);
+                let found = self.page.pixel(x.into(), y.into()).into();
+                if expected != found {
+                    return Err(Wrong::Texel {
+                        x,
+                        y,
+                        down,
+                        expected,
+                        found,
+                    });
+                }
+                let outside = n < 0 || n >= i128::from(size) * c;
+                *clamped |= outside;
+                *tied |= !outside && n == i128::from(expected) * c;
+            }
+        }
+        let marks = &marks[..len.into()];
+        Ok(Compared {
+            samples: len.into(),
+            clamped: marks.iter().filter(|mark| mark.0).count() as u64,
+            ties: marks.iter().filter(|mark| mark.1).count() as u64,
+        })
+    }
+}
+
+/// A form's value at a pixel's centre.
+fn at(form: &Form, x: u16, y: u16) -> i128 {
+    let [origin, right, down] = [form.origin, form.right, form.down].map(i128::from);
+    origin + right * i128::from(x) + down * i128::from(y)
+}
+
+/// Whether some shift makes the real forms into the plane's, as far as [`ROUNDING`] lets it, at the
+/// upper end of the first column and at the lower end of the last.
+fn is_cut_by_one_shift(case: &Case, plane: &Plane) -> bool {
+    let upper = case.columns.first().map(|&(x, y, _)| (x, y));
+    let lower = case.columns.last().map(|&(x, y, len)| (x, y + len - 1));
+    let pixels = upper.into_iter().chain(lower).map(|(x, y)| {
+        let cut = [plane.a, plane.b, plane.c].map(|form| at(&form, x, y));
+        (cut, forms(&case.anchors, FOCAL_LENGTH, x, y))
+    });
+    let pixels: Vec<_> = pixels.collect();
+    (0..48).any(|shift| {
+        let near = |(cut, real): (&i128, &i128)| {
+            ((cut << shift) - real).abs() <= i128::from(ROUNDING) << shift
+        };
+        let all = |(cut, real): &([i128; 3], [i128; 3])| cut.iter().zip(real).all(near);
+        pixels.iter().all(all)
+    })
+}
