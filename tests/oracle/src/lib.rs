@@ -1,12 +1,12 @@
 //! What the renderer must do, from the definitions, and the sweeps that compare the two.
 //!
-//! One renderer on both sides of a comparison cancels its own bugs. So [`coverage`] and [`texel`]
-//! share no code with the renderer, but for the plain types of points and faces, and are
+//! One renderer on both sides of a comparison cancels its own bugs. So [`coverage`], [`texel`] and
+//! [`sight`] share no code with the renderer, but for the plain types of points and faces, and are
 //! written to be read beside the definitions.
 //!
 //! [`mix`] makes the polygons that are most likely to go wrong, [`check`] compares the renderer's
 //! scans with the oracle on them, [`shrink`] makes a failure small. [`plane`] does the same for the
-//! exact mapper. `cargo sweep` runs all of them for as long
+//! exact mapper, [`solid`] for whole solids in any pose. `cargo sweep` runs all of them for as long
 //! as it is told to, the default tests for some seconds.
 #![forbid(unsafe_code)]
 
@@ -15,5 +15,7 @@ pub mod coverage;
 pub mod mix;
 pub mod plane;
 pub mod shrink;
+pub mod sight;
 pub mod small_world;
+pub mod solid;
 pub mod texel;

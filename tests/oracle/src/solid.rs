@@ -1,0 +1,703 @@
+//! Whole solids in any pose: nothing dropped, no gap, and each face where lines of sight meet it.
+//!
+//! As in [`crate::mix`], a case depends on the seed, its mix and its number alone.
+
+use std::fmt;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+use fastrand::Rng;
+use modex::{Destination, HEIGHT, Lane, Palette, PlanarBuffer, STRIDE, WIDTH};
+use scene::{
+    Corner, FOCAL_LENGTH, Face, LIGHT_LEVELS, LightTable, Mesh, NEAR, Pose, Scene, Stage, Storage,
+    Vec3,
+};
+use texmap::{MAX_COORDINATE, Point, Stats, Texture};
+
+use crate::coverage::{Area, Pixels, Row, inside};
+use crate::mix::stream;
+use crate::sight;
+
+/// 1 unit, 16.16.
+const UNIT: i32 = 1 << 16;
+/// Texels of a side of the solids' texture.
+const TEXELS: u16 = 16;
+
+/// A solid of one texture, owned.
+#[derive(Clone, Debug)]
+pub struct Solid {
+    /// Points, 16.16.
+    pub vertices: Vec<Vec3>,
+    corners: Vec<Corner>,
+    faces: Vec<Face>,
+}
+
+impl Solid {
+    /// The faces by their vertices, clockwise from outside.
+    pub fn new(vertices: &[Vec3], faces: &[&[u16]]) -> Self {
+        let mut solid = Self {
+            vertices: vertices.to_vec(),
+            corners: Vec::new(),
+            faces: Vec::new(),
+        };
+        for face in faces {
+            solid.faces.push(Face {
+                first: solid.corners.len() as u16,
+                corners: face.len() as u16,
+                texture: 0,
+                normal: [0, 0, -1 << 14],
+            });
+            let side = i32::from(TEXELS) << 16;
+            let places = [(0, 0), (side, 0), (side, side), (0, side)];
+            for (i, &vertex) in face.iter().enumerate() {
+                let (u, v) = places[i % 4];
+                solid.corners.push(Corner { vertex, u, v });
+            }
+        }
+        solid
+    }
+
+    /// A box of these half sides: bit k of a vertex is its sign along axis k.
+    pub fn cuboid(half: Vec3) -> Self {
+        let vertices: Vec<Vec3> = (0..8)
+            .map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 1 { half[k] } else { -half[k] }))
+            .collect();
+        Self::new(
+            &vertices,
+            &[
+                &[0, 1, 3, 2],
+                &[5, 4, 6, 7],
+                &[4, 0, 2, 6],
+                &[1, 5, 7, 3],
+                &[4, 5, 1, 0],
+                &[2, 3, 7, 6],
+            ],
+        )
+    }
+
+    /// The unit octahedron, every edge of which may lie exactly on pixels' centres.
+    pub fn octahedron() -> Self {
+        let axes = [0, 1, 2].map(|k| [0, 1, 2].map(|i| i32::from(i == k) << 16));
+        let vertices: Vec<Vec3> = axes.iter().flat_map(|&a| [a, a.map(|k| -k)]).collect();
+        let mut faces = Vec::new();
+        for signs in 0..8u16 {
+            let [x, y, z] = [signs & 1, 2 + (signs >> 1 & 1), 4 + (signs >> 2)];
+            let odd = signs.count_ones() % 2 == 1;
+            faces.push(if odd { [x, y, z] } else { [x, z, y] });
+        }
+        let faces: Vec<&[u16]> = faces.iter().map(|face| &face[..]).collect();
+        Self::new(&vertices, &faces)
+    }
+
+    /// The unit ball of the demo.
+    pub fn ball() -> Self {
+        let mesh = scene::ball(&[]).mesh;
+        let mut solid = Self {
+            vertices: mesh.vertices.to_vec(),
+            corners: mesh.corners.to_vec(),
+            faces: mesh.faces.to_vec(),
+        };
+        // Another texture: its places only have to be inside.
+        for corner in &mut solid.corners {
+            corner.u %= i32::from(TEXELS) << 16;
+            corner.v %= i32::from(TEXELS) << 16;
+        }
+        solid
+    }
+
+    /// Every face turned over: what was seen from outside is seen from inside.
+    #[must_use]
+    pub fn inside_out(mut self) -> Self {
+        for face in &self.faces {
+            self.corners[usize::from(face.first)..][..usize::from(face.corners)].reverse();
+        }
+        self
+    }
+
+    /// Moved, so that `eye` is at the origin: at distance 0 it is the eye's place.
+    #[must_use]
+    pub fn seen_from(mut self, eye: Vec3) -> Self {
+        for vertex in &mut self.vertices {
+            *vertex = [0, 1, 2].map(|k| vertex[k] - eye[k]);
+        }
+        self
+    }
+
+    /// Each vertex `lengths` as far from the middle (16.16), taken in turn. Any lengths leave a
+    /// surface that each ray from the middle meets once.
+    #[must_use]
+    pub fn stretched(mut self, lengths: &[i32]) -> Self {
+        for (vertex, &length) in self.vertices.iter_mut().zip(lengths.iter().cycle()) {
+            *vertex = vertex.map(|k| ((i64::from(k) * i64::from(length)) >> 16) as i32);
+        }
+        self
+    }
+
+    /// Calls `act` with a stage on which the solid is.
+    pub fn on_stage<T>(&self, storage: &mut Storage, act: impl FnOnce(&mut Stage<'_>) -> T) -> T {
+        static LIGHT: LightTable = [[1; 256]; LIGHT_LEVELS];
+        static PALETTE: Palette = [[0; 3]; 256];
+        static BACKGROUND: [u8; HEIGHT] = [0; HEIGHT];
+        let texels = [0; TEXELS as usize * TEXELS as usize];
+        let textures = [Texture::new(&texels, TEXELS, TEXELS).expect("as many texels")];
+        let scene = Scene {
+            name: "test",
+            mesh: Mesh {
+                vertices: &self.vertices,
+                corners: &self.corners,
+                faces: &self.faces,
+            },
+            textures: &textures,
+            palette: &PALETTE,
+            light: &LIGHT,
+            background: &BACKGROUND,
+        };
+        act(&mut Stage::new(storage, scene))
+    }
+
+    /// The corners of each face in the viewer's space.
+    fn views(&self, pose: &Pose) -> impl Iterator<Item = Vec<Vec3>> {
+        let orientation = pose.orientation();
+        let view = move |corner: &Corner| {
+            let [x, y, z] = orientation.turn(self.vertices[usize::from(corner.vertex)]);
+            [x, y, z + pose.distance]
+        };
+        self.faces.iter().map(move |face| {
+            let corners = &self.corners[usize::from(face.first)..][..usize::from(face.corners)];
+            corners.iter().map(view).collect()
+        })
+    }
+}
+
+/// How often each pixel was written, with a page to write to.
+#[derive(Debug)]
+pub struct Count {
+    times: Vec<u8>,
+    page: Box<PlanarBuffer>,
+}
+
+impl Default for Count {
+    fn default() -> Self {
+        Self {
+            times: vec![0; WIDTH * HEIGHT],
+            page: Box::new(PlanarBuffer::new()),
+        }
+    }
+}
+
+impl Count {
+    /// Pixels never written, and pixels written more than once.
+    pub fn gaps_and_doubles(&self) -> (usize, usize) {
+        let count = |wrong: fn(u8) -> bool| self.times.iter().filter(|&&n| wrong(n)).count();
+        (count(|n| n == 0), count(|n| n > 1))
+    }
+
+    /// The first pixel whose number of times is wrong, with the number.
+    fn first(&self, mut wrong: impl FnMut(usize, u8) -> bool) -> Option<(i32, i32, u8)> {
+        let mut all = self.times.iter().enumerate();
+        let (i, &times) = all.find(|&(i, &times)| wrong(i, times))?;
+        Some(((i % WIDTH) as i32, (i / WIDTH) as i32, times))
+    }
+
+    /// Draws a solid, nothing having been written before.
+    pub fn draw(&mut self, storage: &mut Storage, solid: &Solid, pose: &Pose) -> Stats {
+        self.times.fill(0);
+        solid.on_stage(storage, |stage| stage.draw(pose, self))
+    }
+}
+
+impl Destination for Count {
+    fn select(&mut self, _: u16) {}
+
+    fn lane<const STEP: usize>(
+        &mut self,
+        x: u16,
+        y: u16,
+        len: u16,
+        draw: impl FnOnce(Lane<'_, STEP>),
+    ) {
+        assert_eq!(STEP, STRIDE, "columns alone are drawn");
+        for row in y..y + len {
+            let times = &mut self.times[usize::from(row) * WIDTH + usize::from(x)];
+            *times = times.saturating_add(1);
+        }
+        self.page.lane(x, y, len, draw);
+    }
+}
+
+/// A solid's form. Lengths are as [`Solid::stretched`] has them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// [`Solid::ball`].
+    Ball(Vec<i32>),
+    /// [`Solid::octahedron`].
+    Octahedron(Vec<i32>),
+    /// [`Solid::cuboid`] of half sides, seen from a place inside of it.
+    Cuboid(Vec3, Vec3),
+}
+
+/// Where the eye is, and so what must hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Eye {
+    /// What the solid's front covers, its back does, each pixel as often: so the front leaves no
+    /// gap. Each pixel is written once, or lies in a fold: a facet at the silhouette may be turned
+    /// over by snapping, or by the rounding of its corners before. It then lies on its neighbour,
+    /// 1/256 pixel wide, and where a pixel's centre lies in there both cover it. No rule for single
+    /// polygons can tell: culling by the real area would leave a gap.
+    Outside,
+    /// Each pixel is written once.
+    Inside,
+    /// Each face covers the pixels whose lines of sight meet it, but for those within 1/128 pixel
+    /// of an edge. Snapping moves a vertex by 1/512 pixel each way.
+    Anywhere,
+}
+
+/// What a case consists of.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Case {
+    /// The solid.
+    pub shape: Shape,
+    /// Where it is.
+    pub pose: Pose,
+    /// Where the eye is.
+    pub eye: Eye,
+}
+
+impl Case {
+    fn solid(&self) -> Solid {
+        match &self.shape {
+            Shape::Ball(lengths) => Solid::ball().stretched(lengths),
+            Shape::Octahedron(lengths) => Solid::octahedron().stretched(lengths),
+            Shape::Cuboid(half, eye) => Solid::cuboid(*half).seen_from(*eye),
+        }
+    }
+
+    /// A test with the case, for `kernel/scene/tests/clips.rs`; `from` says where it was found.
+    pub fn source(&self, wrong: &Wrong, from: impl fmt::Display) -> String {
+        let Self { shape, pose, eye } = self;
+        let shape = match shape {
+            Shape::Ball(lengths) => format!("Ball(vec!{lengths:?})"),
+            Shape::Octahedron(lengths) => format!("Octahedron(vec!{lengths:?})"),
+            Shape::Cuboid(..) => format!("{shape:?}"),
+        };
+        format!(
+            "/// {wrong}. Found by {from}.\n#[test]\nfn found_by_a_sweep() {{\n    \
+             use oracle::solid::{{Case, Checker, Eye, Shape}};\n    \
+             let case = Case {{\n        shape: Shape::{shape},\n        pose: {pose:?},\n        \
+             eye: Eye::{eye:?},\n    }};\n    \
+             assert_eq!(Checker::default().case(&case).err(), None);\n}}\n"
+        )
+    }
+}
+
+/// A kind of solids.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mix {
+    /// The ball from outside, from a radius of a twentieth of a pixel on.
+    Ball,
+    /// A cube from outside.
+    Cube,
+    /// An octahedron from outside.
+    Octahedron,
+    /// The ball from inside.
+    InBall,
+    /// Boxes from inside, half of them with the eye as near to a face as it may come.
+    InBox,
+    /// Balls and octahedra with vertices at any distance, from inside.
+    InCrag,
+    /// Octahedra with vertices at any distance, wherever the eye is: cut by the near plane and by
+    /// the guard band.
+    Anywhere,
+}
+
+impl Mix {
+    /// All of them.
+    pub const ALL: [Self; 7] = [
+        Self::Ball,
+        Self::Cube,
+        Self::Octahedron,
+        Self::InBall,
+        Self::InBox,
+        Self::InCrag,
+        Self::Anywhere,
+    ];
+
+    /// What it is called in the tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Ball => "ball from outside",
+            Self::Cube => "cube from outside",
+            Self::Octahedron => "octahedron from outside",
+            Self::InBall => "ball from inside",
+            Self::InBox => "boxes from inside",
+            Self::InCrag => "crags from inside",
+            Self::Anywhere => "crags from anywhere",
+        }
+    }
+
+    /// Case `number` of this mix.
+    pub fn case(self, seed: u64, number: u64) -> Case {
+        let mut random = stream(seed, 64 + self as u64, number);
+        let random = &mut random;
+        match self {
+            Self::Ball => from_outside(random, UNIT, |scale| Shape::Ball(vec![scale])),
+            // Its corners are at the square root of three.
+            Self::Cube => from_outside(random, 113_513, |scale| Shape::Cuboid([scale; 3], [0; 3])),
+            Self::Octahedron => from_outside(random, UNIT, |scale| Shape::Octahedron(vec![scale])),
+            Self::InBall => {
+                // Its faces are nowhere nearer than 0.98 to its middle.
+                let distance = random.i32(0..UNIT / 100 * 97);
+                Case {
+                    shape: Shape::Ball(vec![UNIT]),
+                    pose: pose(random, distance),
+                    eye: Eye::Inside,
+                }
+            }
+            Self::InBox => {
+                let half = [0; 3].map(|_| length(random) / 2);
+                let eye = half.map(|half| {
+                    let most = half - 257;
+                    match random.u8(0..9) {
+                        0 => most,
+                        1 => -most,
+                        _ => random.i32(-most..=most),
+                    }
+                });
+                Case {
+                    shape: Shape::Cuboid(half, eye),
+                    pose: pose(random, 0),
+                    eye: Eye::Inside,
+                }
+            }
+            Self::InCrag => {
+                let shape = if random.u8(0..3) == 0 {
+                    let lengths = Solid::ball().vertices;
+                    let lengths = lengths.iter().map(|_| random.i32(1 << 14..1 << 18));
+                    Shape::Ball(lengths.collect())
+                } else {
+                    Shape::Octahedron((0..6).map(|_| length(random)).collect())
+                };
+                Case {
+                    shape,
+                    pose: pose(random, 0),
+                    eye: Eye::Inside,
+                }
+            }
+            Self::Anywhere => {
+                // From half the near plane's distance on, all sizes alike.
+                let mut any = || {
+                    let bits = random.u32(6..22);
+                    random.i32(1 << bits..=2 << bits)
+                };
+                let lengths = (0..6).map(|_| any()).collect();
+                let distance = any();
+                let distance = random.choice([0, distance]).unwrap_or(0);
+                Case {
+                    shape: Shape::Octahedron(lengths),
+                    pose: pose(random, distance),
+                    eye: Eye::Anywhere,
+                }
+            }
+        }
+    }
+}
+
+fn from_outside(random: &mut Rng, reach: i32, shape: impl Fn(i32) -> Shape) -> Case {
+    let shift = random.choice([0, 3, 6]).unwrap_or(0);
+    let distance = if random.u8(0..8) == 0 {
+        // With room for what turning rounds.
+        (reach >> shift) + 260 + random.i32(0..UNIT / 4)
+    } else {
+        let bits = random.u32(17..23);
+        random.i32(1 << bits..=(2 << bits).min(Pose::MAX_DISTANCE))
+    };
+    Case {
+        shape: shape(UNIT >> shift),
+        pose: pose(random, distance),
+        eye: Eye::Outside,
+    }
+}
+
+/// Any angles at a distance; a fifth of them lie along the axes, where faces are edge-on or fill the
+/// screen.
+pub fn pose(random: &mut Rng, distance: i32) -> Pose {
+    let mut angle = || {
+        if random.u8(0..5) == 0 {
+            random.u32(0..8) << 29
+        } else {
+            random.u32(..)
+        }
+    };
+    Pose {
+        yaw: angle(),
+        pitch: angle(),
+        roll: angle(),
+        distance,
+    }
+}
+
+/// From 1/64 unit to 64 units, all sizes alike.
+pub fn length(random: &mut Rng) -> i32 {
+    let bits = random.u32(10..22);
+    random.i32(1 << bits..=2 << bits)
+}
+
+/// What is wrong with a case.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Wrong {
+    /// Drawing it panicked.
+    Panicked,
+    /// So many faces were dropped.
+    Dropped(u32),
+    /// The pixel was not written, or so many times, and in no fold.
+    Times(i32, i32, u8),
+    /// The pixel was not written as often by the solid's front as by its back.
+    Sides(i32, i32),
+    /// The face with these corners is drawn on the pixel, or not, as its line of sight does not
+    /// tell; so far from the nearest edge in 1/1000 pixel.
+    Sight(i32, i32, Vec<Vec3>, u32),
+}
+
+impl fmt::Display for Wrong {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Panicked => write!(f, "drawing it panicked"),
+            Self::Dropped(faces) => write!(f, "{faces} faces were dropped"),
+            Self::Times(x, y, times) => write!(f, "({x}, {y}) was written {times} times"),
+            Self::Sides(x, y) => write!(f, "front and back differ at ({x}, {y})"),
+            Self::Sight(x, y, corners, off) => {
+                let (pixels, rest) = (off / 1000, off % 1000);
+                write!(
+                    f,
+                    "({x}, {y}), {pixels}.{rest:03} pixel from an edge, is not as its line of sight to \
+                     {corners:?} says"
+                )
+            }
+        }
+    }
+}
+
+impl std::error::Error for Wrong {}
+
+/// What was compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Compared {
+    /// Faces drawn, or asked for.
+    pub faces: u64,
+    /// Pixels compared.
+    pub pixels: u64,
+    /// Those of them that a fold has ([`Eye::Outside`]).
+    pub folds: u64,
+    /// Faces on the screen, beyond which the near plane or the guard band cut ([`Eye::Anywhere`]).
+    pub cut: [u64; 2],
+    /// Pixels from which the near plane alone took a face.
+    pub cut_away: u64,
+    /// Pixels that snapping took to the other side of an edge.
+    pub changed: u64,
+    /// The furthest of these from its edge, in pixels.
+    pub furthest: f64,
+}
+
+impl std::ops::AddAssign for Compared {
+    fn add_assign(&mut self, more: Self) {
+        self.faces += more.faces;
+        self.pixels += more.pixels;
+        self.folds += more.folds;
+        self.cut = [0, 1].map(|k| self.cut[k] + more.cut[k]);
+        self.cut_away += more.cut_away;
+        self.changed += more.changed;
+        self.furthest = self.furthest.max(more.furthest);
+    }
+}
+
+/// Furthest from a true edge that a pixel may lie on the other side.
+const SNAPPED: f64 = 1.0 / 128.0;
+
+/// Checks cases; it has the memory for that.
+#[derive(Debug, Default)]
+pub struct Checker {
+    storage: Box<Storage>,
+    front: Count,
+    back: Count,
+    covered: Pixels,
+}
+
+impl Checker {
+    /// Checks a case, and says what was compared.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn case(&mut self, case: &Case) -> Result<Compared, Wrong> {
+        let (solid, pose) = (case.solid(), &case.pose);
+        // A panic is a failure like another, to be printed.
+        let check = AssertUnwindSafe(|| match case.eye {
+            Eye::Outside => self.seen_from_outside(&solid, pose),
+            Eye::Inside => self.seen_from_inside(&solid.inside_out(), pose),
+            Eye::Anywhere => {
+                let mut compared = self.by_sight(&solid, pose)?;
+                compared += self.by_sight(&solid.inside_out(), pose)?;
+                Ok(compared)
+            }
+        });
+        catch_unwind(check).unwrap_or(Err(Wrong::Panicked))
+    }
+
+    fn seen_from_inside(&mut self, solid: &Solid, pose: &Pose) -> Result<Compared, Wrong> {
+        let stats = self.front.draw(&mut self.storage, solid, pose);
+        none_dropped(stats)?;
+        match self.front.first(|_, times| times != 1) {
+            Some((x, y, times)) => Err(Wrong::Times(x, y, times)),
+            None => Ok(Compared {
+                faces: stats.polygons.into(),
+                pixels: (WIDTH * HEIGHT) as u64,
+                ..Compared::default()
+            }),
+        }
+    }
+
+    fn seen_from_outside(&mut self, solid: &Solid, pose: &Pose) -> Result<Compared, Wrong> {
+        let turned = solid.clone().inside_out();
+        let fronts = self.front.draw(&mut self.storage, solid, pose);
+        let backs = self.back.draw(&mut self.storage, &turned, pose);
+        none_dropped(fronts)?;
+        none_dropped(backs)?;
+        let back = &self.back.times;
+        if let Some((x, y, _)) = self.front.first(|i, times| times != back[i]) {
+            return Err(Wrong::Sides(x, y));
+        }
+        let mut folds = 0;
+        if let Some((x, y, times)) = self.front.first(|i, times| {
+            let (x, y) = ((i % WIDTH) as i32, (i / WIDTH) as i32);
+            let fold = times > 1
+                && [solid, &turned]
+                    .into_iter()
+                    .any(|solid| is_in_fold(&mut self.storage, solid, pose, x, y));
+            folds += u64::from(fold);
+            times > 1 && !fold
+        }) {
+            return Err(Wrong::Times(x, y, times));
+        }
+        Ok(Compared {
+            faces: (fronts.polygons + backs.polygons).into(),
+            pixels: self.front.times.iter().filter(|&&times| times > 0).count() as u64,
+            folds,
+            ..Compared::default()
+        })
+    }
+
+    /// Compares the faces of a solid that look at the eye with lines of sight, each for itself.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn by_sight(&mut self, solid: &Solid, pose: &Pose) -> Result<Compared, Wrong> {
+        let mut drawn = Vec::new();
+        let mut dropped = 0;
+        solid.on_stage(&mut self.storage, |stage| {
+            stage.polygons(pose, |face| match face {
+                Some(face) => drawn.push((
+                    face.anchors.map(|anchor| anchor.position),
+                    face.polygon
+                        .iter()
+                        .map(|&v| v.into())
+                        .collect::<Vec<Point>>(),
+                )),
+                None => dropped += 1,
+            });
+        });
+        if dropped > 0 {
+            return Err(Wrong::Dropped(dropped));
+        }
+        let mut drawn = drawn.into_iter().peekable();
+        let mut compared = Compared::default();
+        for corners in solid.views(pose) {
+            let polygon = drawn.next_if(|(positions, _)| *positions == anchors(&corners));
+            let polygon = polygon.map(|(_, polygon)| polygon);
+            compared += self.face(&corners, polygon.as_deref())?;
+        }
+        assert!(drawn.next().is_none(), "a face that the solid has not");
+        Ok(compared)
+    }
+
+    fn face(&mut self, corners: &[Vec3], polygon: Option<&[Point]>) -> Result<Compared, Wrong> {
+        let face = sight::Face::new(corners);
+        let mut compared = Compared {
+            faces: 1,
+            ..Compared::default()
+        };
+        let area = match polygon {
+            Some(polygon) => Area::around(polygon),
+            None if !face.looks_at_eye() || face.is_beside_screen() => return Ok(compared),
+            None => Area {
+                x: 0..WIDTH as i32,
+                y: 0..HEIGHT as i32,
+            },
+        };
+        let polygon = polygon.unwrap_or_default();
+        self.covered.cover(polygon, &area);
+        compared.pixels = area.pixels();
+        let mut seen = false;
+        for y in area.y.clone() {
+            let (between, met) = face.row(y, area.x.clone());
+            seen |= !met.is_empty();
+            compared.cut_away += (between.len() - met.len()) as u64;
+            // What is left are the pixels that differ.
+            self.covered.toggle_from(met.start, y);
+            self.covered.toggle_from(met.end, y);
+            if *self.covered.row(y) == Row::default() {
+                continue;
+            }
+            for x in area.x.clone().filter(|&x| self.covered.contains(x, y)) {
+                let distance = face.distance(x, y);
+                if distance > SNAPPED {
+                    let off = (distance * 1000.0) as u32;
+                    return Err(Wrong::Sight(x, y, corners.to_vec(), off));
+                }
+                compared.changed += 1;
+                compared.furthest = compared.furthest.max(distance);
+            }
+        }
+        let at_guard = |p: &Point| p.x.abs().max(p.y.abs()) == MAX_COORDINATE;
+        compared.cut = [
+            corners.iter().any(|corner| corner[2] < NEAR),
+            polygon.iter().any(at_guard),
+        ]
+        .map(|cut| u64::from(seen && cut));
+        Ok(compared)
+    }
+}
+
+/// Those of a face's corners that [`texmap::Face`] has: by them it is known again.
+fn anchors(corners: &[Vec3]) -> [Vec3; 3] {
+    [0, 1, 2].map(|i| corners[i * corners.len() / 3])
+}
+
+fn none_dropped(stats: Stats) -> Result<(), Wrong> {
+    match stats.dropped {
+        0 => Ok(()),
+        faces => Err(Wrong::Dropped(faces)),
+    }
+}
+
+/// Furthest that rounding has moved a corner from where a convex solid has it, in 2^-16 unit: along
+/// each axis a half by the mesh, one by [`Solid::stretched`] and a half by turning.
+const ROUNDED: f64 = 2.0 * 1.733;
+
+/// Whether a face covers the pixel that is drawn, and that rounding may have turned over.
+fn is_in_fold(storage: &mut Storage, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
+    let mut covering = Vec::new();
+    solid.on_stage(storage, |stage| {
+        stage.polygons(pose, |drawn| {
+            let drawn = drawn.into_iter();
+            covering.extend(drawn.filter_map(|drawn| {
+                let polygon: Vec<Point> = drawn.polygon.iter().map(|&v| v.into()).collect();
+                let anchors = drawn.anchors.map(|anchor| anchor.position);
+                inside(&polygon, x, y).then_some(anchors)
+            }));
+        });
+    });
+    solid.views(pose).any(|corners| {
+        let z = corners.iter().map(|corner| corner[2]).max();
+        let snapped = f64::from(z.unwrap_or(0)) / f64::from(512 * FOCAL_LENGTH);
+        let by = ROUNDED + snapped * std::f64::consts::SQRT_2;
+        covering.contains(&anchors(&corners)) && sight::Face::new(&corners).is_edge_on(by)
+    })
+}
