@@ -6,6 +6,7 @@ use std::fmt;
 use crystal_ball::golden::{self, Golden};
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::coverage::inside;
+use oracle::solid::{self, Checker, Compared, Solid};
 use oracle::texel::{affine, perspective};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{FOCAL_LENGTH, Pose, Stage, Storage};
@@ -195,81 +196,57 @@ fn every_golden_is_what_the_oracle_draws() {
 }
 
 /// The second oracle knows nothing of snapping: a ray meets a face if it passes each of its edges
-/// on the same side, which is the sign of an exact determinant in the viewer's space. Snapping moves
-/// a vertex by 1/512 pixel each way; no pixel further than 1/128 from a true edge may change sides.
+/// on the same side, which is the sign of an exact determinant in the viewer's space, and beyond the
+/// near plane. No pixel further than 1/128 from a true edge may change sides.
 #[test]
 fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     let seed = fastrand::u64(..);
     println!("seed {seed}");
     let mut random = fastrand::Rng::with_seed(seed);
-    let mut texels = Box::new([0; scene::TEXELS]);
-    let textures = [scene::paint_ball(&mut texels)];
-    let mut storage = Box::new(Storage::new());
-    let mut stage = Stage::new(&mut storage, scene::ball(&textures));
+    let mut checker = Checker::default();
+    let ball = Solid::ball();
+    let mut compare = |solid: &Solid, pose: &Pose| {
+        let compared = checker.by_sight(solid, pose);
+        compared.unwrap_or_else(|wrong| panic!("{wrong}: {pose:?}"))
+    };
+    let mut far = Compared::default();
     let mut goldens = golden::find(&golden::folder()).unwrap();
     goldens.retain(|golden| scene(golden).name == "ball");
-    let mut poses: Vec<_> = goldens.iter().map(pose).collect();
-    poses.extend((0..100).map(|_| {
-        let furthest = 1 << random.u32(18..24);
-        Pose {
-            yaw: random.u32(..),
-            pitch: random.u32(..),
-            roll: random.u32(..),
-            distance: random.i32(66_000..furthest),
-        }
-    }));
-    let (mut pixels, mut changed, mut furthest) = (0u64, 0u64, 0f64);
-    for pose in &poses {
-        stage.polygons(pose, |drawn| {
-            let drawn = drawn.expect("nothing legal is dropped");
-            let corners = drawn.anchors.map(|anchor| anchor.position.map(i128::from));
-            // What the near plane cuts has other edges.
-            if drawn.polygon.len() > 3 || corners.iter().any(|v| v[2] < i128::from(scene::NEAR)) {
-                return;
-            }
-            let edges = [0, 1, 2].map(|i| {
-                let (p, q) = (corners[i], corners[(i + 1) % 3]);
-                [0, 1, 2].map(|k| {
-                    let (l, m) = ((k + 1) % 3, (k + 2) % 3);
-                    p[l] * q[m] - p[m] * q[l]
-                })
-            });
-            let points: Vec<Point> = drawn.polygon.iter().map(|&vertex| vertex.into()).collect();
-            let span = |of: fn(&Point) -> i32, end: usize| {
-                let least = points.iter().map(of).min().unwrap_or(0) / 256 - 2;
-                let most = points.iter().map(of).max().unwrap_or(0) / 256 + 2;
-                least.clamp(0, end as i32)..most.clamp(0, end as i32)
-            };
-            for (x, y) in
-                span(|p| p.x, WIDTH).flat_map(|x| span(|p| p.y, HEIGHT).map(move |y| (x, y)))
-            {
-                // Twice the ray, so that it is whole.
-                let ray = [2 * x - 319, 2 * y - 239, 2 * FOCAL_LENGTH].map(i128::from);
-                let sides = edges.map(|edge| (0..3).map(|k| edge[k] * ray[k]).sum::<i128>());
-                let met = sides.iter().all(|&side| side > 0) || sides.iter().all(|&side| side < 0);
-                pixels += 1;
-                if met == inside(&points, x, y) {
-                    continue;
-                }
-                changed += 1;
-                // In pixels: a side's value over its slope across the screen.
-                let distance = |(edge, side): (&[i128; 3], &i128)| {
-                    let slope = (2.0 * edge[0] as f64).hypot(2.0 * edge[1] as f64);
-                    (*side as f64).abs() / slope
-                };
-                let nearest = edges.iter().zip(&sides).map(distance);
-                let nearest = nearest.fold(f64::INFINITY, f64::min);
-                assert!(
-                    nearest <= 1.0 / 128.0,
-                    "({x}, {y}) of {corners:?}: {nearest}"
-                );
-                furthest = furthest.max(nearest);
-            }
-        });
+    for golden in &goldens {
+        far += compare(&ball, &pose(golden));
     }
-    println!("{pixels} pixels, {changed} changed sides, at most {furthest:.5} from a true edge");
-    assert!(
-        changed > 50,
-        "only {changed} of {pixels} changed sides at all"
-    );
+    for _ in 0..100 {
+        let furthest = 1 << random.u32(18..24);
+        let distance = random.i32(66_000..furthest);
+        far += compare(&ball, &solid::pose(&mut random, distance));
+    }
+    let mut near = Compared::default();
+    for _ in 0..60 {
+        // Within an eighth of a unit above or below a vertex, half of them nearer than the near plane.
+        let reach = random.choice([128, 1 << 13]).unwrap();
+        let vertex = ball.vertices[random.usize(..ball.vertices.len())];
+        let eye = vertex.map(|k| k + random.i32(-reach..=reach));
+        let seen = ball.clone().seen_from(eye);
+        let pose = solid::pose(&mut random, 0);
+        near += compare(&seen, &pose);
+        near += compare(&seen.inside_out(), &pose);
+    }
+    for (name, compared) in [("from afar", &far), ("from nearby", &near)] {
+        let Compared {
+            pixels,
+            changed,
+            furthest,
+            cut: [by_near, by_guard],
+            cut_away,
+            ..
+        } = compared;
+        println!(
+            "{name}: {pixels} pixels, {changed} changed sides, at most {furthest:.5} from a true edge; \
+             the near plane cut {by_near} faces that are seen, the guard band {by_guard}; \
+             {cut_away} pixels cut away"
+        );
+        assert!(*changed > 50, "only {changed} of {pixels} changed sides");
+    }
+    let by_near = near.cut[0];
+    assert!(by_near > 20 && near.cut_away > 10_000, "{near:?}");
 }
