@@ -1,4 +1,4 @@
-//! The sweep of the renderer's coverage against the oracle: `cargo sweep`.
+//! The sweep of the renderer against the oracle: `cargo sweep`.
 
 use std::io::{IsTerminal, stderr};
 use std::process::ExitCode;
@@ -11,9 +11,11 @@ use oracle::check::{Case, Checker};
 use oracle::mix::Mix;
 use oracle::shrink::{shrink, source};
 use oracle::small_world::{STEPS, TRIANGLES, triangle};
+use oracle::{plane, solid};
 
-/// Compares the column scan, the row scan and the oracle on random polygons, or on all of a
-/// small world. Exit code 0: equal; 1: not, with a test to paste; 130: interrupted.
+/// Compares the renderer with the oracle on random cases that favour trouble: polygons by both scans,
+/// texels of the exact mapper, solids in any pose. Or all triangles of a small world. Exit code 0:
+/// equal; 1: not, with a test to paste; 2: wrong usage; 130: interrupted.
 #[derive(Parser)]
 #[command(name = "cargo sweep")]
 struct Arguments {
@@ -23,15 +25,19 @@ struct Arguments {
     /// Stop after this many minutes
     #[arg(long, conflicts_with = "seconds")]
     minutes: Option<u64>,
-    /// Stop after this many cases of each mix
+    /// Stop after this many cases of each mix; of solids every 50th is tried
     #[arg(long)]
     cases: Option<u64>,
-    /// Make the same polygons again [default: a fresh one]
+    /// Make the same cases again [default: fresh ones]
     #[arg(long, conflicts_with = "small_world")]
     seed: Option<u64>,
     /// Begin with this case, where a sweep of the same seed ended
     #[arg(long, default_value_t = 0)]
     from: u64,
+    /// Only the mixes with this in their names, as in the table: "texels", "solids: cube"; may be
+    /// given again
+    #[arg(long, value_name = "TEXT", conflicts_with = "small_world")]
+    only: Vec<String>,
     /// Every triangle on a lattice of 16 x 16, all 16.7 million, with a step of 128/256 pixel
     /// or as given
     #[arg(long, value_name = "STEP", num_args = 0..=1, default_missing_value = "128",
@@ -44,8 +50,12 @@ fn step(text: &str) -> Result<i32, String> {
     step.ok_or_else(|| format!("the step is one of {STEPS:?}"))
 }
 
-/// Cases between two looks at the clock, of each mix.
+/// Cases between two looks at the clock, of each mix: a fraction of a second.
 const ROUND: u64 = 1000;
+
+/// A solid takes as long as some hundred polygons: with only every 50th case tried, solids, texels
+/// and polygons get about a third of the time each.
+const SOLIDS: u64 = 50;
 
 /// Without a terminal: how often it is told how far the sweep is.
 const SILENCE: Duration = Duration::from_secs(10);
@@ -61,61 +71,203 @@ struct Tally {
     failed: u64,
 }
 
-/// The kinds of cases that a sweep goes through side by side.
-enum Cases {
-    Mixes(u64),
+/// What solids came to, beside that.
+#[derive(Default)]
+struct Solids {
+    /// Pixels seen from outside.
+    outside: u64,
+    compared: solid::Compared,
+}
+
+/// What a sweep goes through side by side.
+#[derive(Clone, Copy)]
+enum Kind {
+    Polygons(Mix),
+    Texels(plane::Mix),
+    Solids(solid::Mix),
     SmallWorld(i32),
 }
 
-impl Cases {
-    fn names(&self) -> Vec<&'static str> {
+impl Kind {
+    /// All mixes.
+    fn mixes() -> impl Iterator<Item = Self> {
+        let polygons = Mix::ALL.map(Self::Polygons);
+        let texels = plane::Mix::ALL.map(Self::Texels);
+        let solids = solid::Mix::ALL.map(Self::Solids);
+        polygons.into_iter().chain(texels).chain(solids)
+    }
+
+    fn name(self) -> String {
         match self {
-            Self::Mixes(_) => Mix::ALL.map(Mix::name).into(),
-            Self::SmallWorld(_) => vec!["the small world"],
+            Self::Polygons(mix) => format!("polygons: {}", mix.name()),
+            Self::Texels(mix) => format!("texels: {}", mix.name()),
+            Self::Solids(mix) => format!("solids: {}", mix.name()),
+            Self::SmallWorld(_) => "the small world".to_owned(),
         }
     }
 
-    fn case(&self, kind: usize, number: u64) -> Case {
+    /// Every how manieth number is a case.
+    fn stride(self) -> u64 {
         match self {
-            Self::Mixes(seed) => Mix::ALL[kind].case(*seed, number),
-            Self::SmallWorld(step) => Case {
-                polygons: vec![triangle(*step, number as u32).to_vec()],
+            Self::Solids(_) => SOLIDS,
+            _ => 1,
+        }
+    }
+
+    /// The case, of a kind that consists of polygons.
+    fn polygons(self, seed: u64, number: u64) -> Option<Case> {
+        match self {
+            Self::Polygons(mix) => Some(mix.case(seed, number)),
+            Self::SmallWorld(step) => Some(Case {
+                polygons: vec![triangle(step, number as u32).to_vec()],
                 outline: None,
-            },
+            }),
+            _ => None,
+        }
+    }
+}
+
+/// What checks the cases.
+#[derive(Default)]
+struct Checkers {
+    polygons: Checker,
+    texels: plane::Checker,
+    solids: solid::Checker,
+    /// What the solids came to so far.
+    seen: Solids,
+}
+
+impl Checkers {
+    /// Tries a case; nothing comes back of one that failed.
+    fn try_case(&mut self, kind: Kind, seed: u64, number: u64) -> Option<Tally> {
+        let tally = |polygons, pixels| Tally {
+            polygons,
+            pixels,
+            ..Tally::default()
+        };
+        match kind {
+            Kind::Polygons(_) | Kind::SmallWorld(_) => {
+                let case = kind.polygons(seed, number)?;
+                let pixels = self.polygons.case(&case).ok()?;
+                Some(tally(case.polygons.len() as u64, pixels))
+            }
+            Kind::Texels(mix) => {
+                let compared = self.texels.case(&mix.case(seed, number)).ok()?;
+                Some(tally(1, compared.samples))
+            }
+            Kind::Solids(mix) => {
+                let case = mix.case(seed, number);
+                let compared = self.solids.case(&case).ok()?;
+                if case.eye == solid::Eye::Outside {
+                    self.seen.outside += compared.pixels;
+                }
+                self.seen.compared += compared;
+                Some(tally(compared.faces, compared.pixels))
+            }
         }
     }
 
+    /// A test with a case that failed.
+    fn source(&mut self, kind: Kind, seed: u64, number: u64, from: &str) -> String {
+        const FAILS: &str = "a case fails again";
+        match kind {
+            Kind::Polygons(_) | Kind::SmallWorld(_) => {
+                let case = kind.polygons(seed, number).expect("polygons");
+                let small = shrink(&mut self.polygons, &case);
+                let wrong = self.polygons.case(&small).expect_err(FAILS);
+                source(&small, &wrong, from)
+            }
+            Kind::Texels(mix) => {
+                let small = mix.case(seed, number).shrink(&mut self.texels);
+                let wrong = self.texels.case(&small).expect_err(FAILS);
+                small.source(&wrong, from)
+            }
+            Kind::Solids(mix) => {
+                let case = mix.case(seed, number);
+                let wrong = self.solids.case(&case).expect_err(FAILS);
+                case.source(&wrong, from)
+            }
+        }
+    }
+}
+
+/// What is swept, and how it is asked for.
+struct Plan {
+    kinds: Vec<Kind>,
+    seed: u64,
     /// The options that make the same cases again.
-    fn options(&self) -> String {
-        match self {
-            Self::Mixes(seed) => format!("--seed {seed}"),
-            Self::SmallWorld(step) => format!("--small-world {step}"),
+    options: String,
+    /// One more than the last case.
+    last: u64,
+}
+
+impl Plan {
+    fn new(arguments: &Arguments) -> Result<Self, String> {
+        if let Some(step) = arguments.small_world {
+            return Ok(Self {
+                kinds: vec![Kind::SmallWorld(step)],
+                seed: 0,
+                options: format!("--small-world {step}"),
+                last: u64::from(TRIANGLES),
+            });
+        }
+        let named = |text: &String| Kind::mixes().any(|kind| kind.name().contains(text));
+        if let Some(text) = arguments.only.iter().find(|text| !named(text)) {
+            let names: Vec<_> = Kind::mixes().map(Kind::name).collect();
+            let names = names.join("\n  ");
+            return Err(format!(
+                "no mix has {text:?} in its name; these are\n  {names}"
+            ));
+        }
+        let only = &arguments.only;
+        let wanted = |kind: &Kind| {
+            let name = kind.name();
+            only.is_empty() || only.iter().any(|text| name.contains(text))
+        };
+        let seed = arguments.seed.unwrap_or_else(|| fastrand::u64(..));
+        let only: String = only
+            .iter()
+            .map(|text| format!(" --only {text:?}"))
+            .collect();
+        Ok(Self {
+            kinds: Kind::mixes().filter(wanted).collect(),
+            seed,
+            options: format!("--seed {seed}{only}"),
+            last: u64::MAX,
+        })
+    }
+
+    /// How a case is told, so that it can be tried again.
+    fn told(&self, kind: Kind, number: u64) -> String {
+        let name = kind.name();
+        match kind {
+            Kind::SmallWorld(_) => format!("cargo sweep {}: case {number}", self.options),
+            _ => format!("cargo sweep --seed {}: {name}, case {number}", self.seed),
         }
     }
 }
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    let cases = match arguments.small_world {
-        Some(step) => Cases::SmallWorld(step),
-        None => Cases::Mixes(arguments.seed.unwrap_or_else(|| fastrand::u64(..))),
+    let plan = match Plan::new(&arguments) {
+        Ok(plan) => plan,
+        Err(error) => {
+            eprintln!("error: {error}");
+            return ExitCode::from(2);
+        }
     };
     // A second Ctrl-C is not needed: a round takes a fraction of a second.
     if let Err(error) = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed)) {
         eprintln!("Ctrl-C will lose the figures: {error}");
     }
-    println!("cargo sweep {}", cases.options());
-    sweep(&cases, &arguments)
+    println!("cargo sweep {}", plan.options);
+    sweep(&plan, &arguments)
 }
 
-fn sweep(cases: &Cases, arguments: &Arguments) -> ExitCode {
-    let last = match cases {
-        Cases::Mixes(_) => u64::MAX,
-        Cases::SmallWorld(_) => u64::from(TRIANGLES),
-    };
-    let end = arguments
-        .cases
-        .map_or(last, |cases| arguments.from.saturating_add(cases).min(last));
+fn sweep(plan: &Plan, arguments: &Arguments) -> ExitCode {
+    let end = arguments.cases.map_or(plan.last, |cases| {
+        arguments.from.saturating_add(cases).min(plan.last)
+    });
     let seconds = arguments
         .minutes
         .map(|minutes| minutes * 60)
@@ -125,53 +277,51 @@ fn sweep(cases: &Cases, arguments: &Arguments) -> ExitCode {
         .map(Duration::from_secs);
     let begun = Instant::now();
     let mut progress = Progress::new(limit, arguments.from, end);
-    let names = cases.names();
-    let mut tallies = vec![Tally::default(); names.len()];
+    let mut tallies = vec![Tally::default(); plan.kinds.len()];
     let mut failures = Vec::new();
-    let mut checker = Checker::default();
+    let mut checkers = Checkers::default();
     let mut number = arguments.from;
     while number < end && failures.is_empty() {
         let round = number..number.saturating_add(ROUND).min(end);
-        for (kind, tally) in tallies.iter_mut().enumerate() {
+        for (&kind, tally) in plan.kinds.iter().zip(&mut tallies) {
             for number in round.clone() {
-                let case = cases.case(kind, number);
+                if number % kind.stride() != 0 {
+                    continue;
+                }
                 tally.tried += 1;
-                tally.polygons += case.polygons.len() as u64;
-                match checker.case(&case) {
-                    Ok(pixels) => tally.pixels += pixels,
-                    Err(_) => {
-                        tally.failed += 1;
-                        // One of a mix is enough to look at.
-                        if tally.failed == 1 {
-                            let small = shrink(&mut checker, &case);
-                            let wrong = checker.case(&small).expect_err("it still fails");
-                            let from = format!("{}, case {number}", names[kind]);
-                            let from = format!("cargo sweep {}: {from}", cases.options());
-                            failures.push(source(&small, &wrong, from));
-                        }
-                    }
+                if let Some(more) = checkers.try_case(kind, plan.seed, number) {
+                    tally.polygons += more.polygons;
+                    tally.pixels += more.pixels;
+                    continue;
+                }
+                tally.failed += 1;
+                // One of a mix is enough to look at.
+                if tally.failed == 1 {
+                    let from = plan.told(kind, number);
+                    failures.push(checkers.source(kind, plan.seed, number, &from));
                 }
             }
         }
         number = round.end;
-        progress.at(number);
+        progress.at(number, begun.elapsed());
         let late = limit.is_some_and(|limit| begun.elapsed() >= limit);
         if late || INTERRUPTED.load(Ordering::Relaxed) {
             break;
         }
     }
     drop(progress);
-    print(&names, &tallies, begun.elapsed());
+    print(&plan.kinds, &tallies, begun.elapsed());
+    checkers.seen.print();
     if !failures.is_empty() {
         for failure in failures {
             print!("\n{failure}");
         }
         return ExitCode::from(1);
     }
-    if number < last {
+    if number < plan.last {
         println!(
             "continue with: cargo sweep {} --from {number}",
-            cases.options()
+            plan.options
         );
     }
     match INTERRUPTED.load(Ordering::Relaxed) {
@@ -180,10 +330,10 @@ fn sweep(cases: &Cases, arguments: &Arguments) -> ExitCode {
     }
 }
 
-fn print(names: &[&str], tallies: &[Tally], took: Duration) {
+fn print(kinds: &[Kind], tallies: &[Tally], took: Duration) {
     let mut sum = Tally::default();
     println!(
-        "{:26} {:>11} {:>11} {:>14} {:>7}",
+        "{:35} {:>10} {:>11} {:>14} {:>7}",
         "", "tried", "polygons", "pixels", "failed"
     );
     let line = |name: &str, tally: &Tally| {
@@ -193,10 +343,10 @@ fn print(names: &[&str], tallies: &[Tally], took: Duration) {
             pixels,
             failed,
         } = tally;
-        println!("{name:26} {tried:11} {polygons:11} {pixels:14} {failed:7}");
+        println!("{name:35} {tried:10} {polygons:11} {pixels:14} {failed:7}");
     };
-    for (name, tally) in names.iter().zip(tallies) {
-        line(name, tally);
+    for (kind, tally) in kinds.iter().zip(tallies) {
+        line(&kind.name(), tally);
         sum.tried += tally.tried;
         sum.polygons += tally.polygons;
         sum.pixels += tally.pixels;
@@ -206,9 +356,32 @@ fn print(names: &[&str], tallies: &[Tally], took: Duration) {
     println!("in {:.1} s", took.as_secs_f64());
 }
 
+impl Solids {
+    /// What is no failure, and still to be known.
+    fn print(&self) {
+        let Self { outside, compared } = self;
+        if *outside > 0 {
+            println!(
+                "{} of {outside} pixels seen from outside lie in a fold: two facets have them, since \
+                 rounding turned one over at the silhouette",
+                compared.folds
+            );
+        }
+        if compared.changed > 0 {
+            let [near, guard] = compared.cut;
+            println!(
+                "{} pixels lie across a true edge, by {:.5} pixel at most; {near} faces seen were cut by \
+                 the near plane, {guard} by the guard band",
+                compared.changed, compared.furthest
+            );
+        }
+    }
+}
+
 /// Tells on standard error how far it is: on a terminal by a moving line, elsewhere now and then.
 struct Progress {
     from: u64,
+    limit: Option<Duration>,
     said: Instant,
     bar: Option<ProgressBar>,
 }
@@ -219,8 +392,11 @@ impl Progress {
             eprintln!("at most {} s", limit.as_secs());
         }
         let bar = stderr().is_terminal().then(|| {
-            let (template, length) = match end {
-                u64::MAX => ("  {spinner} {pos} cases of each mix, {elapsed}", 0),
+            let (template, length) = match (end, limit) {
+                (u64::MAX, Some(limit)) => (
+                    "  {wide_bar} {pos} of {len} s, {msg} cases of each",
+                    limit.as_secs(),
+                ),
                 _ => (
                     "  {wide_bar} {pos} of {len}, {elapsed}",
                     end.saturating_sub(from),
@@ -229,21 +405,23 @@ impl Progress {
             let style = ProgressStyle::with_template(template).expect("the template is constant");
             ProgressBar::new(length).with_style(style)
         });
+        let by_time = end == u64::MAX;
         Self {
             from,
+            limit: limit.filter(|_| by_time),
             said: Instant::now(),
             bar,
         }
     }
 
-    fn at(&mut self, number: u64) {
+    fn at(&mut self, number: u64, elapsed: Duration) {
         let done = number - self.from;
         if let Some(bar) = &self.bar {
-            bar.tick();
-            bar.set_position(done);
+            bar.set_message(done.to_string());
+            bar.set_position(self.limit.map_or(done, |_| elapsed.as_secs()));
         } else if self.said.elapsed() >= SILENCE {
             self.said = Instant::now();
-            eprintln!("  {done} cases of each");
+            eprintln!("  {done} cases of each in {} s", elapsed.as_secs());
         }
     }
 }
