@@ -4,7 +4,7 @@ use modex::Destination;
 
 use crate::coverage::Axis;
 use crate::loops::Loop;
-use crate::runs::{Pieces, Steps};
+use crate::runs::{self, Pieces, Steps};
 use crate::{Texture, affine, exact, free, level, plane};
 
 /// How a run's texture is walked: starts and steps, one mapper's or another's.
@@ -165,12 +165,10 @@ impl Job {
             Walk::Exact(walk) => exact::column(texture, walk, self.len, column),
             Walk::Wall(wall) => wall.column(texture, column),
             Walk::Linear(walk, pieces) => {
-                let mut steps = Steps::linear(walk, self.len, pieces, texture);
-                column.fill(|| texel(texture, steps.next()));
+                runs::linear(texture, walk, self.len, pieces, style.affine, column);
             }
             Walk::Quadratic(walk, pieces) => {
-                let mut steps = Steps::quadratic(walk, self.len, pieces, texture);
-                column.fill(|| texel(texture, steps.next()));
+                runs::quadratic(texture, walk, self.len, pieces, column);
             }
             Walk::Free(_) => unreachable!("it is no column"),
         });

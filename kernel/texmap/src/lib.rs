@@ -13,6 +13,7 @@
 
 pub mod affine;
 mod along;
+pub mod bounds;
 pub mod coverage;
 pub mod exact;
 pub mod free;
@@ -26,9 +27,11 @@ mod renderer;
 pub mod runs;
 mod straight;
 pub mod tiles;
+pub mod within;
 
 pub use job::{Job, JobList, Rows, Style, Walk};
 pub use mapper::{Face, Mapper};
 pub use plane::Plane;
 pub use polygon::{MAX_COORDINATE, MAX_SIDES, Point, SUBPIXELS, Texture, TextureError, Vertex};
 pub use renderer::{Order, Renderer, Stats};
+pub use within::Tolerance;

@@ -8,6 +8,7 @@ use crate::job::{Job, Rows, Style, Walk};
 use crate::loops::Loop;
 use crate::plane::{self, Anchor, Plane};
 use crate::runs::Pieces;
+use crate::within::{Tolerance, Within};
 use crate::{Texture, Vertex, free, level, tiles};
 
 /// A face on the screen, as the mappers need it.
@@ -53,6 +54,8 @@ pub enum Mapper {
     Free,
     /// Affine where a column or row has one depth, otherwise exact.
     Level,
+    /// For every polygon and column the cheapest way that keeps to an error.
+    Within(Tolerance),
 }
 
 /// A mapper's name, the mapper, and a line about it.
@@ -147,6 +150,11 @@ impl Mapper {
             "perspective; linear in pieces of powers of two, a shift in place of each division",
         ),
         (
+            "linear",
+            Self::Linear(Pieces::Whole),
+            "perspective; linear between the quotients at each column's ends",
+        ),
+        (
             "quadratic-16",
             Self::Quadratic(Pieces::Of(16)),
             "perspective; quadratic through three quotients every 16 pixels",
@@ -182,14 +190,42 @@ impl Mapper {
             "perspective; one division a column of a wall or row of a floor, otherwise exact",
         ),
         (
+            "within-1",
+            Self::Within(Tolerance::part(0)),
+            "perspective; for each face and column the cheapest way within a texel",
+        ),
+        (
+            "within-1/2",
+            Self::Within(Tolerance::part(1)),
+            "perspective; for each face and column the cheapest way within 1/2 texel",
+        ),
+        (
+            "within-1/4",
+            Self::Within(Tolerance::part(2)),
+            "perspective; for each face and column the cheapest way within 1/4 texel",
+        ),
+        (
+            "within-1/16",
+            Self::Within(Tolerance::part(4)),
+            "perspective; for each face and column the cheapest way within 1/16 texel",
+        ),
+        (
+            "within-1/256",
+            Self::Within(Tolerance::part(8)),
+            "perspective; for each face and column the cheapest way within 1/256 texel",
+        ),
+        (
             "exact",
             Self::Exact,
             "perspective; a quotient for every pixel, rounded nowhere",
         ),
     ];
 
-    /// The mapper of a name.
+    /// The mapper of a name; `within-` takes any [`Tolerance`].
     pub fn parse(name: &str) -> Option<Self> {
+        if let Some(tolerance) = name.strip_prefix("within-") {
+            return Tolerance::parse(tolerance).map(Self::Within);
+        }
         let named = Self::ALL.iter().find(|(known, ..)| *known == name);
         named.map(|&(_, mapper, _)| mapper)
     }
@@ -248,6 +284,13 @@ impl Mapper {
             _ => {}
         }
         let plane = face.plane();
+        if let Self::Within(tolerance) = self {
+            let within = Within::new(polygon, plane, texture, tolerance);
+            return runs(Axis::Down, polygon, |run| {
+                let walk = within.walk(run.line, run.first, run.len, texture);
+                add(Axis::Down, &run, walk);
+            });
+        }
         let axis = match self {
             Self::Nearer if plane.c.right.abs() < plane.c.down.abs() => Axis::Right,
             _ => Axis::Down,
@@ -278,6 +321,9 @@ impl Default for Mapper {
 
 impl fmt::Display for Mapper {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        match self {
+            Self::Within(tolerance) => write!(f, "within-{tolerance}"),
+            _ => f.write_str(self.name()),
+        }
     }
 }

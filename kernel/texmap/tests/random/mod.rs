@@ -1,0 +1,114 @@
+//! Random columns of a texture's plane, and what their pixels should be.
+
+// Each test takes what it needs.
+#![allow(dead_code)]
+
+use texmap::plane::Walk;
+
+/// Columns that every default test of an error looks at, for each mapper.
+pub const COLUMNS: u32 = 100_000;
+/// Those of the deep ones.
+pub const DEEP_COLUMNS: u32 = 1_000_000;
+
+/// A generator, its seed printed.
+pub fn generator() -> fastrand::Rng {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    fastrand::Rng::with_seed(seed)
+}
+
+/// A side of a texture: powers of two and not, 1, the largest.
+pub fn side(random: &mut fastrand::Rng) -> u16 {
+    match random.u8(0..4) {
+        0 => random.u16(1..=4),
+        1 => 1 << random.u16(0..=8),
+        _ => random.u16(1..=256),
+    }
+}
+
+/// A depth ratio from 1 to 4096, any power of two between 2^-20 above 1 and that.
+fn ratio(random: &mut fastrand::Rng) -> f64 {
+    match random.u8(0..4) {
+        0 => 1.0,
+        1 => 1.0 + (-20.0 * random.f64()).exp2(),
+        _ => (12.0 * random.f64()).exp2(),
+    }
+}
+
+/// A coordinate at an end: in the texture.
+fn end(random: &mut fastrand::Rng, size: u16) -> f64 {
+    match random.u8(0..8) {
+        0 => 0.0,
+        1 => size.into(),
+        _ => random.f64() * f64::from(size),
+    }
+}
+
+/// A run of a face that is seen: c is above zero, and the coordinates are inside the texture, but for
+/// rounding.
+pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> Walk {
+    let ratio = ratio(random);
+    let near = (20.0 + 33.0 * random.f64()).exp2() * ratio.max(1.0);
+    let near = near.min(53f64.exp2());
+    let mut ends = [near, near / ratio];
+    if random.bool() {
+        ends.reverse();
+    }
+    let steps = i64::from(len.max(2)) - 1;
+    let mut forms = [[0; 2]; 3];
+    forms[2] = ends.map(|c| (c as i64).max(1));
+    for (k, size) in [size.0, size.1].into_iter().enumerate() {
+        let from = end(random, size);
+        let to = match random.u8(0..4) {
+            // Hardly any texture.
+            0 => (from + random.f64() * (-20.0 * random.f64()).exp2()).min(size.into()),
+            _ => end(random, size),
+        };
+        forms[k] = [0, 1].map(|i| ([from, to][i] * forms[2][i] as f64) as i64);
+    }
+    // What the steps are cut by may leave the texture by a little.
+    Walk {
+        at: forms.map(|[from, _]| from),
+        step: forms.map(|[from, to]| (to - from) / steps),
+    }
+}
+
+/// Any run: outside the texture, across the horizon and behind it, and c = 0 at one of its pixels.
+pub fn any(random: &mut fastrand::Rng, len: u16) -> Walk {
+    let value = |random: &mut fastrand::Rng, bits: u32| {
+        let limit = 1i64 << random.u32(0..=bits);
+        random.i64(-limit..=limit)
+    };
+    let steps = i64::from(len.max(2)) - 1;
+    let [a, b, c] = [61, 61, 53].map(|bits| {
+        let (from, to) = (value(random, bits), value(random, bits));
+        (from, (to - from) / steps)
+    });
+    let mut walk = Walk {
+        at: [a.0, b.0, c.0],
+        step: [a.1, b.1, c.1],
+    };
+    if random.u8(0..4) == 0 {
+        // Zero at a pixel's centre.
+        walk.at[2] = -walk.step[2] * random.i64(0..len.into());
+    }
+    walk
+}
+
+/// The quotient n / c in units of 2^-16 texel, clamped into a texture of `size` texels; on and beyond
+/// the horizon what it comes to before.
+pub fn truth(n: i64, c: i64, size: u16) -> f64 {
+    let last = f64::from(size) * 65536.0 - 1.0;
+    match (n < 0, c > 0) {
+        (true, _) => 0.0,
+        (false, true) => (n as f64 / c as f64 * 65536.0).min(last),
+        (false, false) => last,
+    }
+}
+
+/// How far coordinates are from the truth at pixel `i` of a walk, the worse of the two.
+pub fn off(walk: &Walk, i: u16, (u, v): (i32, i32), size: (u16, u16)) -> f64 {
+    let [a, b, c] = walk.after(i);
+    let off = |n: i64, at: i32, size: u16| (truth(n, c, size) - f64::from(at)).abs();
+    off(a, u, size.0).max(off(b, v, size.1))
+}

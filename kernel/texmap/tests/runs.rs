@@ -1,0 +1,314 @@
+//! Perspective by runs: what is drawn is what [`Job::pixels`] says, that stays inside the texture, and
+//! it is as near to the quotients as [`texmap::bounds`] says.
+
+mod random;
+
+use modex::PlanarBuffer;
+use random::{COLUMNS, DEEP_COLUMNS, any, generator, off, seen, side};
+use texmap::bounds::Bend;
+use texmap::coverage::Axis;
+use texmap::plane;
+use texmap::runs::{Pieces, Reciprocal, over, quotients};
+use texmap::{Job, Style, Texture, Walk};
+
+/// The mappers that draw in pieces, by name.
+const MAPPERS: [(&str, Pieces, bool); 12] = [
+    ("linear-2", Pieces::Of(2), true),
+    ("linear-4", Pieces::Of(4), true),
+    ("linear-8", Pieces::Of(8), true),
+    ("linear-16", Pieces::Of(16), true),
+    ("linear-32", Pieces::Of(32), true),
+    ("linear-100", Pieces::Of(100), true),
+    ("linear-powers", Pieces::Powers, true),
+    ("linear", Pieces::Whole, true),
+    ("quadratic-16", Pieces::Of(16), false),
+    ("quadratic-32", Pieces::Of(32), false),
+    ("quadratic-17", Pieces::Of(17), false),
+    ("quadratic", Pieces::Whole, false),
+];
+
+fn job(walk: plane::Walk, len: u16, (_, pieces, linear): (&str, Pieces, bool)) -> Job {
+    Job {
+        axis: Axis::Down,
+        x: 0,
+        y: 0,
+        len,
+        texture: 0,
+        walk: match linear {
+            true => Walk::Linear(walk, pieces),
+            false => Walk::Quadratic(walk, pieces),
+        },
+    }
+}
+
+fn pixels(job: &Job, texture: &Texture<'_>) -> Vec<(i32, i32)> {
+    let mut pixels = Vec::new();
+    job.pixels(texture, |_, at| pixels.push(at));
+    pixels
+}
+
+#[test]
+fn a_quotient_is_less_than_it_should_be_by_below_a_unit_and_three_128ths() {
+    let mut random = generator();
+    let mut most = 0f64;
+    for _ in 0..2_000_000 {
+        let bits = random.u32(1..=55);
+        let c = random.i64(1..=1 << bits);
+        let n = random.i64(0..(256 * i128::from(c)).min(i64::MAX.into()) as i64);
+        let quotient = i128::from(Reciprocal::new(c).times(n));
+        let (n, c) = (i128::from(n) << 16, i128::from(c));
+        assert!(quotient * c <= n, "{n} / {c} is above");
+        assert!((n - quotient * c) * 128 < c * 131, "{n} / {c} is off");
+        most = most.max((n - quotient * c) as f64 / c as f64);
+    }
+    println!("less by {most} units at most");
+    assert!(
+        most > 1.0,
+        "the bound is what it says only if a unit is passed"
+    );
+}
+
+#[test]
+fn a_step_is_cut_towards_zero() {
+    let mut random = generator();
+    for steps in 1..=319u16 {
+        let largest = (1 << 24) - 1;
+        let n = i32::from(steps);
+        let whole = random.i32(0..largest / n) * n;
+        for delta in [
+            0,
+            1,
+            n - 1,
+            n,
+            largest,
+            whole,
+            whole + n - 1,
+            random.i32(0..=largest),
+        ] {
+            assert_eq!(over(delta, steps), delta / n, "{delta} / {n}");
+            assert_eq!(over(-delta, steps), -delta / n, "-{delta} / {n}");
+        }
+    }
+}
+
+#[test]
+fn what_is_drawn_are_the_texels_of_the_coordinates() {
+    let mut random = generator();
+    let texels: Vec<u8> = (0..1 << 16).map(|_| random.u8(..)).collect();
+    let (mut page, mut planes) = (PlanarBuffer::new(), PlanarBuffer::new());
+    let mut compared = 0;
+    for case in 0..30_000 {
+        let (w, h) = (side(&mut random), side(&mut random));
+        let padded = random.bool();
+        let texture = match padded {
+            true => Texture::padded(&texels[..Texture::padded_len(w, h)], w, h),
+            false => Texture::new(&texels[..usize::from(w) * usize::from(h)], w, h),
+        };
+        let texture = texture.unwrap();
+        let axis = [Axis::Down, Axis::Right][case % 2];
+        let (x, y) = (random.u16(0..320), random.u16(0..240));
+        let len = random.u16(1..=[240 - y, 320 - x][case % 2]);
+        let walk = match random.u8(0..3) {
+            0 => any(&mut random, len),
+            _ => seen(&mut random, len, (w, h)),
+        };
+        let mapper = MAPPERS[random.usize(..MAPPERS.len())];
+        let job = Job {
+            axis,
+            x,
+            y,
+            ..job(walk, len, mapper)
+        };
+        job.draw(Style::default(), &texture, &mut page);
+        for plane in 0..4 {
+            job.draw_in_plane(plane, Style::default(), &texture, &mut planes);
+        }
+        let (last_u, last_v) = texture.last();
+        job.pixels(&texture, |(x, y), (u, v)| {
+            let context = || format!("{} ({x}, {y}) {job:?} on {w} x {h}", mapper.0);
+            let inside = (0..=last_u).contains(&u) && (0..=last_v).contains(&v);
+            assert!(inside, "({u}, {v}) {}", context());
+            let [drawn, in_plane] = [&page, &planes].map(|page| page.pixel(x.into(), y.into()));
+            assert_eq!(
+                (drawn, in_plane),
+                (texture.at(u, v), texture.at(u, v)),
+                "{}",
+                context()
+            );
+            compared += 1;
+        });
+    }
+    println!("{compared} pixels");
+    assert!(compared > 1_000_000);
+}
+
+/// The first pixel of each piece, and the last of the run, have the quotient: the printed loops divide
+/// by end - start in one place and by end - start - 1 in another, and one of the two comes to its end a
+/// pixel too soon or too late.
+#[test]
+fn pieces_meet_at_their_quotients_and_the_run_ends_at_its_own() {
+    let mut random = generator();
+    let texture = Texture::new(&[0; 256 * 256], 256, 256).unwrap();
+    for _ in 0..5_000 {
+        let len = random.u16(1..=240);
+        let walk = seen(&mut random, len, (256, 256));
+        for mapper in MAPPERS {
+            let Pieces::Of(of) = mapper.1 else { continue };
+            let pixels = pixels(&job(walk, len, mapper), &texture);
+            for i in (0..len - 1).step_by(of.into()).chain([len - 1]) {
+                let [a, b, c] = walk.after(i);
+                let quotient = (plane::coordinate(a, c, 256), plane::coordinate(b, c, 256));
+                let is = pixels[usize::from(i)];
+                let off = (is.0 - quotient.0).abs().max((is.1 - quotient.1).abs());
+                // The last pixel is as many cut steps from the piece's start.
+                let drift = match i == len - 1 && mapper.2 {
+                    true => i32::from(of) + 1,
+                    false => 1,
+                };
+                assert!(
+                    off <= drift,
+                    "{} off by {off} at {i} of {len}, {walk:?}",
+                    mapper.0
+                );
+            }
+        }
+    }
+}
+
+/// "Zero's paradox": the horizon in the run, and what lies beyond it.
+#[test]
+fn on_the_horizon_and_beyond_nothing_is_divided_by_zero() {
+    let texture = Texture::new(&[0; 256 * 64], 256, 64).unwrap();
+    let (last_u, last_v) = texture.last();
+    let one = 1 << 20;
+    for mapper in MAPPERS {
+        for len in [1, 2, 3, 5, 17, 240] {
+            for c in [0, -1, -one, -one * 4000] {
+                for (a, u) in [
+                    (-1, 0),
+                    (0, last_u),
+                    (1, last_u),
+                    (1 << 60, last_u),
+                    (-1 << 60, 0),
+                ] {
+                    let walk = plane::Walk {
+                        at: [a, -a, c],
+                        step: [0, 0, 0],
+                    };
+                    let v = if a > 0 { 0 } else { last_v };
+                    for at in pixels(&job(walk, len, mapper), &texture) {
+                        assert_eq!(at, (u, v), "{} of {len}, {walk:?}", mapper.0);
+                    }
+                }
+            }
+            // c is zero at the last pixel, and at the first, and a end of the run sees it.
+            for (at, step) in [(i64::from(len - 1) * one, -one), (0, one)] {
+                let walk = plane::Walk {
+                    at: [one, one, at],
+                    step: [0, 0, step],
+                };
+                let pixels = pixels(&job(walk, len, mapper), &texture);
+                let zero = if at == 0 { 0 } else { pixels.len() - 1 };
+                let off = (pixels[zero].0 - last_u)
+                    .abs()
+                    .max((pixels[zero].1 - last_v).abs());
+                assert!(off <= 240, "{} of {len}: {:?}", mapper.0, pixels[zero]);
+            }
+        }
+    }
+    assert_eq!(quotients([0, -1, 0], (last_u, last_v)), (last_u, 0));
+}
+
+/// How the errors of a mapper compare with its bound.
+struct Errors {
+    /// Error over bound, the largest.
+    tightest: f64,
+    /// The same where the run is inside the texture.
+    inside: f64,
+    worst: f64,
+}
+
+/// Measures a mapper on random columns: no error above its bound.
+fn measure(columns: u32, mapper: (&str, Pieces, bool), random: &mut fastrand::Rng) -> Errors {
+    let texels = vec![0; 1 << 16];
+    let mut errors = Errors {
+        tightest: 0.0,
+        inside: 0.0,
+        worst: 0.0,
+    };
+    for _ in 0..columns {
+        let size = (side(random), side(random));
+        let texels = &texels[..usize::from(size.0) * usize::from(size.1)];
+        let texture = Texture::new(texels, size.0, size.1).unwrap();
+        let len = random.u16(1..=240);
+        let walk = match random.u8(0..16) {
+            0 => any(random, len),
+            _ => seen(random, len, size),
+        };
+        let bend = Bend::new(&walk, len, &texture);
+        let bound = f64::from(match mapper.2 {
+            true => bend.linear(mapper.1),
+            false => bend.quadratic(mapper.1),
+        });
+        let job = job(walk, len, mapper);
+        let (mut error, mut at) = (0f64, 0);
+        job.pixels(&texture, |(_, i), coordinates| {
+            let off = off(&walk, i, coordinates, size);
+            if off > error {
+                (error, at) = (off, i);
+            }
+        });
+        assert!(
+            error <= bound + 1e-6,
+            "{}: {error} at {at} of {len} is above {bound}: {walk:?} on {size:?}, {bend:?}",
+            mapper.0
+        );
+        errors.worst = errors.worst.max(error);
+        let share = error / bound;
+        errors.tightest = errors.tightest.max(share);
+        let inside = |[a, b, c]: [i64; 3]| {
+            let [w, h] = [size.0, size.1].map(i64::from);
+            c > 0 && a >= 0 && b >= 0 && a < w * c && b < h * c
+        };
+        // Such that a texel's 2^-8 is more than what fixed point may add.
+        if inside(walk.at) && inside(walk.after(len - 1)) && bound > 2048.0 {
+            errors.inside = errors.inside.max(share);
+        }
+    }
+    errors
+}
+
+fn measure_all(columns: u32) {
+    let mut random = generator();
+    for mapper in MAPPERS {
+        let Errors {
+            tightest,
+            inside,
+            worst,
+        } = measure(columns, mapper, &mut random);
+        println!(
+            "{:13} worst {:8.3} texels; {:5.1} % of its bound, {:5.1} % with both ends inside",
+            mapper.0,
+            worst / 65536.0,
+            tightest * 100.0,
+            inside * 100.0
+        );
+        assert!(
+            inside >= 0.8,
+            "the bound of {} is loose: {inside}",
+            mapper.0
+        );
+    }
+}
+
+#[test]
+fn no_error_is_above_its_bound_and_the_bound_is_reached() {
+    measure_all(COLUMNS);
+}
+
+/// `cargo test --release -p texmap --test runs -- --ignored --nocapture`
+#[test]
+#[ignore = "a million columns for each mapper: a minute in a release build"]
+fn no_error_of_a_million_columns_is_above_its_bound() {
+    measure_all(DEEP_COLUMNS);
+}
