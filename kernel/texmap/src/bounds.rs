@@ -295,85 +295,86 @@ pub(crate) fn passes(n: (i64, i64), c: (i64, i64)) -> i128 {
 pub struct Affine {
     plane: Plane,
     /// The most that a coordinate is off on any side, 2^-16 texel.
-    sides: u32,
+    sides: u64,
+    /// The size of the texture: both coordinates are inside.
+    most: u64,
 }
 
 impl Affine {
     /// What fixed point may add: 2^-7 texel, most of it where a texture is squeezed into a sliver.
-    const ROUNDING: u32 = 512;
+    const ROUNDING: u64 = 512;
 
     /// That of a polygon whose texture lies in `plane`.
     pub fn new(polygon: &[Vertex], plane: &Plane, texture: &Texture<'_>) -> Self {
-        let mut sides = 0;
+        let (u, v) = texture.last();
+        let mut affine = Self {
+            plane: *plane,
+            sides: 0,
+            most: u.max(v) as u64 + 1,
+        };
+        let mut corners = 0;
         for (i, a) in polygon.iter().enumerate() {
             let b = &polygon[(i + 1) % polygon.len()];
-            sides = sides.max(side(a, b, plane, texture));
+            let (from, to) = (affine.forms(a.x, a.y), affine.forms(b.x, b.y));
+            affine.sides = affine.sides.max(affine.chord(from, to));
+            corners = corners.max(affine.corner(a, from));
         }
-        Self {
-            plane: *plane,
-            sides,
-        }
+        affine.sides += corners;
+        affine
     }
 
     /// The worst error of a coordinate in a column of the polygon, in units of 2^-16 texel.
-    ///
-    /// The crossings lie within a pixel above the first centre and below the last one.
-    pub fn column(&self, run: &Run, texture: &Texture<'_>) -> u32 {
-        let axis = crate::coverage::Axis::Down;
-        let mut walk = Walk::new(&self.plane, axis, run.line, run.first);
-        walk.at = [0, 1, 2].map(|k| walk.at[k] - walk.step[k]);
-        let all = Bend::new(&walk, run.len + 2, texture);
-        let column = all.chord(2 * u64::from(run.len + 1));
-        let error = column + u64::from(self.sides) + u64::from(Self::ROUNDING);
-        // Both are inside the texture.
-        let (u, v) = texture.last();
-        error.min(u.max(v) as u64 + 1) as u32
+    pub fn column(&self, run: &Run) -> u32 {
+        // The crossings have 32 fraction bits, and are off by less than 2^-23: 1/256 further out
+        // than they are.
+        let [top, bottom] = run.between.map(|crossing| (crossing.at >> 24) as i32);
+        let x = i32::from(run.line) * 256 + 128;
+        let column = self.chord(self.forms(x, top - 1), self.forms(x, bottom + 2));
+        (column + self.sides + Self::ROUNDING).min(self.most) as u32
     }
-}
 
-/// The worst error of a coordinate that is linear from corner to corner.
-fn side(a: &Vertex, b: &Vertex, plane: &Plane, texture: &Texture<'_>) -> u32 {
-    let forms = [plane.a, plane.b, plane.c];
-    let at = |vertex: &Vertex| {
-        forms.map(|form| {
-            let right = i128::from(form.right) * i128::from(vertex.x - 128);
-            let down = i128::from(form.down) * i128::from(vertex.y - 128);
+    /// The forms at a place in 1/256 pixel, 256 times.
+    fn forms(&self, x: i32, y: i32) -> [i128; 3] {
+        [self.plane.a, self.plane.b, self.plane.c].map(|form| {
+            let right = i128::from(form.right) * i128::from(x - 128);
+            let down = i128::from(form.down) * i128::from(y - 128);
             i128::from(form.origin) * 256 + right + down
         })
-    };
-    let (from, to) = (at(a), at(b));
-    // As many bits as a form has on the screen; far off it they have more.
-    let size = |forms: [i128; 3]| {
-        let [a, b, c] = forms.map(i128::unsigned_abs);
-        a.max(b).max(c << 8)
-    };
-    let excess = (128 - size(from).max(size(to)).leading_zeros()).saturating_sub(61);
-    let cut = |forms: [i128; 3]| forms.map(|form| (form >> excess) as i64);
-    let (start, end) = (cut(from), cut(to));
-    let far = start[2].min(end[2]);
-    let (u, v) = texture.last();
-    let most = u.max(v) as u32 + 1;
-    // Cutting the forms moves a quotient by less than a unit as long as c has 24 bits.
-    if far < 1 << 24 {
-        return most;
     }
-    let [a_s, b_s, c_s] = [0, 1, 2].map(|k| (start[k], end[k] - start[k]));
-    let far = Above::new(far);
-    let most_passes = passes(a_s, c_s)
-        .unsigned_abs()
-        .max(passes(b_s, c_s).unsigned_abs());
-    let bend = Bend {
-        ends: [(0, 0); 2],
-        steps: 1,
-        pace: far.pace(most_passes),
-        lean: far.lean(c_s.1),
-        outside: 0,
-        most,
-    };
-    let own = |vertex: &Vertex, [a, b, c]: [i128; 3]| {
+
+    /// How far a corner's coordinates are from the quotients there.
+    fn corner(&self, vertex: &Vertex, [a, b, c]: [i128; 3]) -> u64 {
+        if c <= 0 {
+            return self.most;
+        }
         let off = |n: i128, own: i32| (i128::from(own) * c - (n << 16)).unsigned_abs() / c as u128;
-        off(a, vertex.u).max(off(b, vertex.v)).min(most.into()) as u64 + 1
-    };
-    let corners = own(a, from).max(own(b, to));
-    (bend.chord(2) + corners + 2).min(most.into()) as u32
+        off(a, vertex.u).max(off(b, vertex.v)).min(self.most.into()) as u64 + 1
+    }
+
+    /// The closed form between two places.
+    fn chord(&self, from: [i128; 3], to: [i128; 3]) -> u64 {
+        // As many bits as a form has on the screen; far off it they have more.
+        let size = |[a, b, c]: [i128; 3]| {
+            let [a, b, c] = [a, b, c << 8].map(i128::unsigned_abs);
+            a.max(b).max(c)
+        };
+        let excess = (128 - size(from).max(size(to)).leading_zeros()).saturating_sub(61);
+        let [start, end] = [from, to].map(|forms| forms.map(|form| (form >> excess) as i64));
+        let far = start[2].min(end[2]);
+        // Cutting the forms moves a quotient by less than a unit as long as c has 24 bits.
+        if far < 1 << 24 {
+            return self.most;
+        }
+        let [a, b, c] = [0, 1, 2].map(|k| (start[k], end[k] - start[k]));
+        let above = Above::new(far);
+        let bend = Bend {
+            ends: [(0, 0); 2],
+            steps: 1,
+            pace: above.pace(passes(a, c).unsigned_abs().max(passes(b, c).unsigned_abs())),
+            lean: above.lean(c.1),
+            outside: 0,
+            most: self.most as u32,
+        };
+        (bend.chord(2) + 2).min(self.most)
+    }
 }

@@ -22,7 +22,7 @@ use core::fmt;
 use crate::bounds::{Above, Bend, passes};
 use crate::job;
 use crate::plane::{Plane, Walk};
-use crate::runs::{Pieces, between, quotients};
+use crate::runs::{Pieces, Reciprocal, between};
 use crate::{Texture, Vertex, affine};
 use modex::{HEIGHT, WIDTH};
 
@@ -197,7 +197,13 @@ impl Flat {
         if c <= 0 {
             return None;
         }
-        let last = texture.last();
+        // The middle of what the corners span may lie outside the polygon, and the texture.
+        let quotient = |n: i64| {
+            let inside = n.abs() >> 8 < c;
+            let size = inside.then(|| Reciprocal::new(c).times(n.abs()))?;
+            Some(if n < 0 { -size } else { size })
+        };
+        let (u, v) = (quotient(a)?, quotient(b)?);
         let inverse = Above::new(c);
         // A slope of more texels a pixel than this has no place in a polygon that is nearly flat.
         let steep = 1 << 40;
@@ -207,7 +213,6 @@ impl Flat {
             let slope = pace.min(steep) as i64;
             if d > 0 { -slope } else { slope }
         };
-        let (u, v) = quotients([a, b, c], last);
         let map = |at: i32, n: i64, form: crate::plane::Form| {
             let right = slope(n, form.right, plane.c.right);
             let down = slope(n, form.down, plane.c.down);
@@ -249,7 +254,7 @@ impl Flat {
             middle,
             maps,
             spare,
-            last,
+            last: texture.last(),
         })
     }
 
