@@ -105,6 +105,12 @@ impl Reciprocal {
         }
     }
 
+    /// The bits that c is short of 64, and 2^63 over its highest 32 bits as [`Reciprocal::new`] has it.
+    #[inline]
+    pub(crate) fn parts(self) -> (u32, u64) {
+        (self.shift, self.value)
+    }
+
     /// n / c in 16.16 for 0 <= n < 256 c: at most the quotient, and less by below 1 + 3/128 units.
     ///
     /// With c' = c 2^shift / 2^32 and n' = n 2^shift / 2^40 the quotient is 2^24 n' / c', and n' <
@@ -123,8 +129,17 @@ impl Reciprocal {
 ///
 /// Off by less than 1 + 3/128 units of 2^-16 texel, and never above.
 #[inline]
-pub fn quotients([a, b, c]: [i64; 3], last: (i32, i32)) -> (i32, i32) {
-    let reciprocal = Reciprocal::new(c.max(1));
+pub fn quotients(forms: [i64; 3], last: (i32, i32)) -> (i32, i32) {
+    quotients_by(Reciprocal::new(forms[2].max(1)), forms, last)
+}
+
+/// [`quotients`] by the reciprocal of c, or of 1 where c is less.
+#[inline]
+pub(crate) fn quotients_by(
+    reciprocal: Reciprocal,
+    [a, b, c]: [i64; 3],
+    last: (i32, i32),
+) -> (i32, i32) {
     let quotient = |n: i64, last: i32| {
         if n < 0 {
             0
@@ -266,7 +281,7 @@ struct Quadratic {
 
 /// What cuts a run into pieces.
 #[derive(Clone, Copy, Debug)]
-struct Cuts {
+pub(crate) struct Cuts {
     walk: Walk,
     pieces: Pieces,
     last: (i32, i32),
@@ -277,7 +292,7 @@ struct Cuts {
 }
 
 /// A piece: its steps, its pixels, and where it goes from and to.
-struct Piece {
+pub(crate) struct Piece {
     steps: u16,
     pixels: u16,
     from: (i32, i32),
@@ -286,9 +301,22 @@ struct Piece {
     middle: [i64; 3],
 }
 
+impl Piece {
+    #[inline]
+    pub(crate) fn pixels(&self) -> u16 {
+        self.pixels
+    }
+
+    /// The walk along it.
+    #[inline]
+    pub(crate) fn straight(&self) -> affine::Walk {
+        between(self.from, self.to, self.steps)
+    }
+}
+
 impl Cuts {
     #[inline]
-    fn new(walk: Walk, len: u16, pieces: Pieces, texture: &Texture<'_>) -> Self {
+    pub(crate) fn new(walk: Walk, len: u16, pieces: Pieces, texture: &Texture<'_>) -> Self {
         let last = texture.last();
         Self {
             walk,
@@ -301,7 +329,7 @@ impl Cuts {
 
     /// The next piece; whoever has drawn the run's pixels asks for no more.
     #[inline]
-    fn next(&mut self) -> Piece {
+    pub(crate) fn next(&mut self) -> Piece {
         let steps = self.pieces.next(self.left);
         self.left -= steps;
         let from = self.here;
@@ -359,16 +387,9 @@ pub fn linear(
     while !column.is_empty() {
         let piece = cuts.next();
         let (pixels, rest) = column.split(piece.pixels);
-        by.column(texture, straight(&piece), pixels);
+        by.column(texture, piece.straight(), pixels);
         column = rest;
     }
-}
-
-/// The walk along a piece.
-#[inline]
-fn straight(piece: &Piece) -> affine::Walk {
-    let (from, to) = (piece.from, piece.to);
-    between(from, to, piece.steps)
 }
 
 /// The walk of `steps` steps between two places inside the texture.

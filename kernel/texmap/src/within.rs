@@ -118,15 +118,15 @@ impl Way {
     };
 
     /// What it takes for a run of `len` pixels.
-    pub fn cost(self, Cost { run, piece, pixel }: Cost, len: u16) -> u32 {
-        let (steps, len) = (u32::from(len.max(2)) - 1, u32::from(len));
+    pub const fn cost(self, Cost { run, piece, pixel }: Cost, len: u16) -> u32 {
+        let steps = if len > 1 { len as u32 - 1 } else { 1 };
         let pieces = match self {
             Self::Linear(Pieces::Of(of)) | Self::Quadratic(Pieces::Of(of)) => {
-                steps.div_ceil(of.into())
+                steps.div_ceil(of as u32)
             }
             _ => 1,
         };
-        run + piece * pieces + pixel * len
+        run + piece * pieces + pixel * len as u32
     }
 
     /// The most that it is off, in 2^-16 texel.
@@ -138,24 +138,58 @@ impl Way {
         }
     }
 
-    /// The cheapest for a run of `len` pixels that keeps to `tolerance`.
-    pub fn cheapest(bend: &Bend, len: u16, tolerance: Tolerance) -> Self {
+    /// The cheapest for the run that keeps to `tolerance`.
+    pub fn cheapest(bend: &Bend, tolerance: Tolerance) -> Self {
         let keeps = |way: Self| way.bound(bend) <= tolerance.units();
-        let [(whole, _), others @ ..] = Self::ALL;
         // No other takes less.
+        let (whole, _) = Self::ALL[0];
         if keeps(whole) {
             return whole;
         }
-        let (mut best, mut least) = (Self::Exact, u32::MAX);
-        for (way, cost) in others {
-            let cost = way.cost(cost, len);
-            if cost < least && keeps(way) {
-                (best, least) = (way, cost);
-            }
-        }
-        best
+        // Most ways are refused by two multiplications, before their own bound is asked for.
+        let steps = u64::from(bend.steps());
+        let squared = u64::from(tolerance.units()) * steps * steps;
+        let (chord, curve) = (bend.chord_at_least(), bend.curve_at_least());
+        let hopeless = |way: Self| match way {
+            Self::Linear(Pieces::Of(n)) => chord * u64::from(n).pow(2) > squared,
+            Self::Quadratic(Pieces::Of(n)) => curve * u64::from(n).pow(3) > squared * steps,
+            Self::Quadratic(_) => curve > tolerance.units().into(),
+            _ => false,
+        };
+        let order = &ORDERS[usize::from(bend.steps()).min(HEIGHT - 1)];
+        let ways = order.iter().map(|&way| Self::ALL[usize::from(way)].0);
+        ways.into_iter()
+            .find(|&way| !hopeless(way) && keeps(way))
+            .unwrap_or(Self::Exact)
     }
 }
+
+/// The ways but for the first, the cheapest first, for every number of steps.
+static ORDERS: [[u8; Way::ALL.len() - 1]; HEIGHT] = {
+    let mut orders = [[0; Way::ALL.len() - 1]; HEIGHT];
+    let mut steps = 0;
+    while steps < HEIGHT {
+        let order = &mut orders[steps];
+        let mut way = 1;
+        while way < Way::ALL.len() {
+            let (new, cost) = Way::ALL[way];
+            let cost = new.cost(cost, steps as u16 + 1);
+            let mut place = way - 1;
+            while place > 0 {
+                let (before, its) = Way::ALL[order[place - 1] as usize];
+                if before.cost(its, steps as u16 + 1) <= cost {
+                    break;
+                }
+                order[place] = order[place - 1];
+                place -= 1;
+            }
+            order[place] = way as u8;
+            way += 1;
+        }
+        steps += 1;
+    }
+    orders
+};
 
 /// The affine map of a whole polygon that touches its plane's quotients in the middle.
 #[derive(Clone, Copy, Debug)]
@@ -197,14 +231,15 @@ impl Flat {
         if c <= 0 {
             return None;
         }
+        let reciprocal = Reciprocal::new(c);
         // The middle of what the corners span may lie outside the polygon, and the texture.
         let quotient = |n: i64| {
             let inside = n.abs() >> 8 < c;
-            let size = inside.then(|| Reciprocal::new(c).times(n.abs()))?;
+            let size = inside.then(|| reciprocal.times(n.abs()))?;
             Some(if n < 0 { -size } else { size })
         };
         let (u, v) = (quotient(a)?, quotient(b)?);
-        let inverse = Above::new(c);
+        let inverse = Above::new(reciprocal);
         // A slope of more texels a pixel than this has no place in a polygon that is nearly flat.
         let steep = 1 << 40;
         let slope = |n: i64, step: i64, c_step: i64| {
@@ -247,7 +282,7 @@ impl Flat {
         if least <= 0 || change >= 1 << 50 {
             return None;
         }
-        let lean = Above::new(least).lean(lean);
+        let lean = Above::new(Reciprocal::new(least)).lean(lean);
         let off = (u128::from(change) * u128::from(lean)) >> 56;
         let spare = i64::from(tolerance.units()) - off.min(1 << 40) as i64 - 4;
         (spare > 0).then_some(Self {
@@ -337,7 +372,7 @@ impl Within {
         }
         let walk = Walk::new(&self.plane, crate::coverage::Axis::Down, x, y);
         let bend = Bend::new(&walk, len, texture);
-        match Way::cheapest(&bend, len, self.tolerance) {
+        match Way::cheapest(&bend, self.tolerance) {
             Way::Linear(Pieces::Whole) => {
                 let [from, to] = bend.ends;
                 job::Walk::Affine(between(from, to, len - 1))
