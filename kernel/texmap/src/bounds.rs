@@ -200,6 +200,12 @@ impl Bend {
         self.steps
     }
 
+    /// Whether c so many pixels from the far end is half as much again as there: at the nearer side of
+    /// that pixel an error is below a third of the far end's.
+    pub(crate) fn leans(&self, pixels: u16) -> bool {
+        self.lean.saturating_mul(pixels.into()) >= 1 << 31
+    }
+
     /// Less than the error of one chord over the whole run, not counting fixed point: with pieces of n
     /// of its steps it is at least n^2 / steps^2 of this.
     ///

@@ -16,7 +16,7 @@
 //! [`crate::bounds`] says it is never off by. If the estimate less the margin and the estimate and the
 //! margin have the same floor, so has the quotient between them: that *is* the texel. Only where they
 //! have not, which is within the margin of a texel's border, the pixel is divided. At [`MARGIN`] that
-//! is one in 16 at most, where the texture is passed evenly.
+//! is one in 8 at most, where the texture is passed evenly.
 //!
 //! [`Plane::new`]: crate::Plane::new
 
@@ -28,9 +28,7 @@ use crate::plane::{Walk, texel};
 use crate::runs::{Cuts, Pieces};
 
 /// The most that an estimate may be off, in 2^-16 texel.
-const MARGIN: u32 = 1024;
-/// Pixels that get an estimate of their own: what is far bends more than what is near.
-const STRETCH: u16 = 64;
+const MARGIN: u32 = 2048;
 /// Below so many pixels dividing takes less than finding out.
 const LEAST: u16 = 24;
 
@@ -52,18 +50,14 @@ pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_
         texels[usize::from(v) * usize::from(texture.pitch()) + usize::from(u)]
     };
     let (above, rest) = column.split(first);
-    let (mut inside, below) = rest.split(end - first);
+    let (inside, below) = rest.split(end - first);
     above.fill(|| clamped(walk.next()));
-    while !inside.is_empty() {
-        let pixels = STRETCH.min(inside.len());
-        let (stretch, rest) = inside.split(pixels);
-        match estimate(texture, &walk, pixels) {
-            Some((pieces, margin)) => estimated(texture, walk, pieces, margin, stretch),
-            None => divided(texture, walk, stretch),
-        }
-        walk.at = walk.after(pixels);
-        inside = rest;
+    let pixels = inside.len();
+    match estimate(texture, &walk, pixels) {
+        Some((pieces, margin)) => estimated(texture, walk, pieces, margin, inside),
+        None => divided(texture, walk, inside),
     }
+    walk.at = walk.after(pixels);
     below.fill(|| clamped(walk.next()));
 }
 
@@ -84,7 +78,13 @@ fn estimate(texture: &Texture<'_>, walk: &Walk, len: u16) -> Option<(Pieces, i32
         return None;
     }
     let bend = Bend::new(walk, len, texture);
-    let pieces = [Pieces::Whole, Pieces::Of(32), Pieces::Of(16)].into_iter();
+    let pieces = [
+        Pieces::Whole,
+        Pieces::Of(64),
+        Pieces::Of(32),
+        Pieces::Of(16),
+    ]
+    .into_iter();
     let mut margins = pieces.map(|pieces| (pieces, bend.linear(pieces)));
     let (pieces, margin) = margins.find(|&(_, margin)| margin <= MARGIN)?;
     Some((pieces, margin as i32))

@@ -287,8 +287,10 @@ impl Mapper {
         if let Self::Within(tolerance) = self {
             let within = Within::new(polygon, plane, texture, tolerance);
             return runs(Axis::Down, polygon, |run| {
-                let walk = within.walk(run.line, run.first, run.len, texture);
-                add(Axis::Down, &run, walk);
+                let place = (run.line, run.first);
+                within.parts(place, run.len, texture, &mut |first, len, walk| {
+                    add(Axis::Down, &Run { first, len, ..run }, walk);
+                });
             });
         }
         let axis = match self {

@@ -20,6 +20,7 @@
 use core::fmt;
 
 use crate::bounds::{Above, Bend, passes};
+use crate::coverage::Axis;
 use crate::job;
 use crate::plane::{Plane, Walk};
 use crate::runs::{Pieces, Reciprocal, between};
@@ -69,6 +70,9 @@ impl fmt::Display for Tolerance {
     }
 }
 
+/// Fewest pixels of a run that is halved.
+const LEAST_HALVED: u16 = 48;
+
 /// A way to map a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
@@ -98,10 +102,10 @@ impl Way {
             Cost { run, piece, pixel }
         }
         const fn linear(steps: u8) -> (Way, Cost) {
-            (Way::Linear(Pieces::Of(steps)), cost(300, 350, 16))
+            (Way::Linear(Pieces::Of(steps)), cost(100, 100, 16))
         }
         const fn quadratic(pieces: Pieces) -> (Way, Cost) {
-            (Way::Quadratic(pieces), cost(300, 800, 24))
+            (Way::Quadratic(pieces), cost(100, 400, 17))
         }
         [
             (Way::Linear(Pieces::Whole), cost(0, 0, 16)),
@@ -113,7 +117,7 @@ impl Way {
             quadratic(Pieces::Whole),
             quadratic(Pieces::Of(32)),
             quadratic(Pieces::Of(16)),
-            (Way::Exact, cost(300, 0, 200)),
+            (Way::Exact, cost(100, 0, 44)),
         ]
     };
 
@@ -364,15 +368,42 @@ impl Within {
         self.flat.as_ref()?.walk(x, y, len)
     }
 
-    /// The walk down a run of `len` pixels from (x, y).
+    /// Gives `sink` the parts of a run of `len` pixels from (x, y) down: the first pixel of each, its
+    /// pixels, and its walk.
     #[inline]
-    pub fn walk(&self, x: u16, y: u16, len: u16, texture: &Texture<'_>) -> job::Walk {
+    pub fn parts(
+        &self,
+        (x, y): (u16, u16),
+        len: u16,
+        texture: &Texture<'_>,
+        sink: &mut impl FnMut(u16, u16, job::Walk),
+    ) {
         if let Some(walk) = self.flat(x, y, len) {
-            return job::Walk::Affine(walk);
+            return sink(y, len, job::Walk::Affine(walk));
         }
-        let walk = Walk::new(&self.plane, crate::coverage::Axis::Down, x, y);
+        let walk = Walk::new(&self.plane, Axis::Down, x, y);
+        self.cut(walk, y, len, texture, sink);
+    }
+
+    /// Those of a run that needs quotients. What suits the far half may be too good for the near one:
+    /// a run that leans far enough, and takes its time, is halved.
+    fn cut(
+        &self,
+        mut walk: Walk,
+        y: u16,
+        len: u16,
+        texture: &Texture<'_>,
+        sink: &mut impl FnMut(u16, u16, job::Walk),
+    ) {
         let bend = Bend::new(&walk, len, texture);
-        match Way::cheapest(&bend, self.tolerance) {
+        let way = Way::cheapest(&bend, self.tolerance);
+        if way != Way::ALL[0].0 && len >= LEAST_HALVED && bend.leans(len / 2) {
+            let half = len / 2;
+            self.cut(walk, y, half, texture, sink);
+            walk.at = walk.after(half);
+            return self.cut(walk, y + half, len - half, texture, sink);
+        }
+        let walk = match way {
             Way::Linear(Pieces::Whole) => {
                 let [from, to] = bend.ends;
                 job::Walk::Affine(between(from, to, len - 1))
@@ -380,6 +411,7 @@ impl Within {
             Way::Linear(pieces) => job::Walk::Linear(walk, pieces),
             Way::Quadratic(pieces) => job::Walk::Quadratic(walk, pieces),
             Way::Exact => job::Walk::Exact(walk),
-        }
+        };
+        sink(y, len, walk);
     }
 }

@@ -158,64 +158,70 @@ fn within(least: u32, tolerance: &str) {
     let mut random = generator();
     let tolerance = Tolerance::parse(tolerance).unwrap();
     let mut ways = BTreeMap::new();
-    let (mut worst, mut pixels, mut count) = (0f64, 0u64, 0u32);
+    let (mut worst, mut pixels, mut count, mut parts) = (0f64, 0u64, 0u32, 0u32);
     columns(least, &mut random, |face, plane, texture, run| {
         let within = Within::new(face.polygon, *plane, texture, tolerance);
-        let (x, y, len) = (run.line, run.first, run.len);
-        let walk = within.walk(x, y, len, texture);
-        let flat = within.flat(x, y, len);
-        let forms = plane::Walk::new(plane, Axis::Down, x, y);
-        let bend = Bend::new(&forms, len, texture);
-        // Nothing cheaper keeps to it, by its own bound.
-        let keeps = |way: Way| way.bound(&bend) <= tolerance.units();
-        let cheapest = Way::ALL
-            .into_iter()
-            .filter(|&(way, _)| keeps(way))
-            .min_by_key(|&(way, cost)| way.cost(cost, len))
-            .expect("the quotients are none off")
-            .0;
-        let expected = match (flat, cheapest) {
-            (Some(walk), _) => Walk::Affine(walk),
-            (None, Way::Linear(Pieces::Whole)) => {
-                let [from, to] = bend.ends;
-                Walk::Affine(between(from, to, len - 1))
-            }
-            (None, Way::Linear(pieces)) => Walk::Linear(forms, pieces),
-            (None, Way::Quadratic(pieces)) => Walk::Quadratic(forms, pieces),
-            (None, Way::Exact) => Walk::Exact(forms),
-        };
-        assert_eq!(walk, expected, "{run:?} of {:?}", face.polygon);
-        *ways.entry(name(&walk, flat.is_some())).or_insert(0u32) += 1;
-        // And it is no further off than that; the exact coordinates are rounded down.
-        let job = texmap::Job {
-            axis: Axis::Down,
-            x,
-            y,
-            len,
-            texture: 0,
-            walk,
-        };
-        let size = (texture.width(), texture.height());
-        job.pixels(texture, |(_, row), coordinates| {
-            let off = off(&forms, row - y, coordinates, size);
-            let context = || format!("{walk:?} {run:?} of {:?}", face.polygon);
-            assert!(
-                off <= f64::from(tolerance.units()),
-                "{off} at {row}: {}",
-                context()
-            );
-            worst = worst.max(off);
+        let x = run.line;
+        let mut next = run.first;
+        let flat = within.flat(x, run.first, run.len);
+        within.parts((x, run.first), run.len, texture, &mut |y, len, walk| {
+            assert_eq!(y, next, "a part begins where another ended");
+            next += len;
+            let forms = plane::Walk::new(plane, Axis::Down, x, y);
+            let bend = Bend::new(&forms, len, texture);
+            // Nothing cheaper keeps to it, by its own bound.
+            let keeps = |way: Way| way.bound(&bend) <= tolerance.units();
+            let cheapest = Way::ALL
+                .into_iter()
+                .filter(|&(way, _)| keeps(way))
+                .min_by_key(|&(way, cost)| way.cost(cost, len))
+                .expect("the quotients are none off")
+                .0;
+            let expected = match (flat, cheapest) {
+                (Some(walk), _) => Walk::Affine(walk),
+                (None, Way::Linear(Pieces::Whole)) => {
+                    let [from, to] = bend.ends;
+                    Walk::Affine(between(from, to, len - 1))
+                }
+                (None, Way::Linear(pieces)) => Walk::Linear(forms, pieces),
+                (None, Way::Quadratic(pieces)) => Walk::Quadratic(forms, pieces),
+                (None, Way::Exact) => Walk::Exact(forms),
+            };
+            assert_eq!(walk, expected, "{run:?} of {:?}", face.polygon);
+            *ways.entry(name(&walk, flat.is_some())).or_insert(0u32) += 1;
+            parts += 1;
+            // And it is no further off than that; the exact coordinates are rounded down.
+            let job = texmap::Job {
+                axis: Axis::Down,
+                x,
+                y,
+                len,
+                texture: 0,
+                walk,
+            };
+            let size = (texture.width(), texture.height());
+            job.pixels(texture, |(_, row), coordinates| {
+                let off = off(&forms, row - y, coordinates, size);
+                let context = || format!("{walk:?} {run:?} of {:?}", face.polygon);
+                assert!(
+                    off <= f64::from(tolerance.units()),
+                    "{off} at {row}: {}",
+                    context()
+                );
+                worst = worst.max(off);
+            });
         });
-        pixels += u64::from(len);
+        assert_eq!(next, run.first + run.len, "all of the run is mapped");
+        pixels += u64::from(run.len);
         count += 1;
     });
     let share = |count: u32, all: u32| f64::from(count) / f64::from(all) * 100.0;
     let list = ways
         .iter()
-        .map(|(name, &n)| format!("{name} {:.1}", share(n, count)));
+        .map(|(name, &n)| format!("{name} {:.1}", share(n, parts)));
     let list: Vec<_> = list.collect();
     println!(
-        "within {tolerance}: {count} columns of {} pixels, worst {:.1} % of it; % of columns: {}",
+        "within {tolerance}: {count} columns of {} pixels, worst {:.1} % of it; {parts} parts, in %: {}",
         pixels / u64::from(count),
         worst / f64::from(tolerance.units()) * 100.0,
         list.join(", ")
