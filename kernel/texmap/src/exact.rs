@@ -29,6 +29,8 @@ use crate::runs::{Cuts, Pieces};
 
 /// The most that an estimate may be off, in 2^-16 texel.
 const MARGIN: u32 = 2048;
+/// Steps of the shortest pieces that are worth it.
+const SHORTEST: u8 = 16;
 /// Below so many pixels dividing takes less than finding out.
 const LEAST: u16 = 24;
 
@@ -78,11 +80,15 @@ fn estimate(texture: &Texture<'_>, walk: &Walk, len: u16) -> Option<(Pieces, i32
         return None;
     }
     let bend = Bend::new(walk, len, texture);
+    let steps = u64::from(bend.steps());
+    if bend.chord_at_least() * u64::from(SHORTEST).pow(2) > u64::from(MARGIN) * steps * steps {
+        return None;
+    }
     let pieces = [
         Pieces::Whole,
         Pieces::Of(64),
         Pieces::Of(32),
-        Pieces::Of(16),
+        Pieces::Of(SHORTEST),
     ]
     .into_iter();
     let mut margins = pieces.map(|pieces| (pieces, bend.linear(pieces)));

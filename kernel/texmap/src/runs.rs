@@ -29,7 +29,7 @@
 //! Over n steps of a pixel the value grows by S, and S by T, with T = 2 K / n^2 and S = (d - K) / n +
 //! K / n^2: not by the two coefficients, which are those of a step without an end. They have 48
 //! fraction bits, and each is off by less than 2^13 / n last places ([`share`]), or by none where n is
-//! a power of two: over 239 pixels the value drifts by less than 2^-27 texel. It starts half of
+//! a power of two: over 319 pixels the value drifts by less than 2^-26 texel. It starts half of
 //! 2^-16 higher, so cutting the rest off rounds to nearest, and a drift below zero or beyond the last
 //! coordinate is cut off with it.
 //!
@@ -163,10 +163,10 @@ const INVERSES: [u64; MAX_STEPS + 1] = {
     inverses
 };
 
-/// `delta / steps`, cut towards zero; |delta| < 2^24, steps 1 to 319 below 2^8, or a power of two.
+/// `delta / steps`, cut towards zero; |delta| < 2^24, steps 1 to 319.
 ///
-/// (delta m) / 2^32 with m the next whole number above 2^32 / steps is too large by less than
-/// delta / 2^32 < 2^-8, and a quotient that is not whole is at least 1 / steps short of the next.
+/// Below 2^8 steps: (delta m) / 2^32 with m the next whole number above 2^32 / steps is too large by
+/// delta / 2^32 < 2^-8 at most, and a quotient is at least 1 / steps short of the next whole number.
 #[inline]
 pub fn over(delta: i32, steps: u16) -> i32 {
     if steps.is_power_of_two() {

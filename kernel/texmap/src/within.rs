@@ -70,8 +70,8 @@ impl fmt::Display for Tolerance {
     }
 }
 
-/// Fewest pixels of a run that is halved.
-const LEAST_HALVED: u16 = 48;
+/// What must be to gain by halving a run, as a [`Cost`]: two more bounds to find, and as much again.
+const HALVING: u32 = 2400;
 
 /// A way to map a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -97,7 +97,7 @@ pub struct Cost {
 
 impl Way {
     /// All of them, with what they take.
-    pub const ALL: [(Self, Cost); 10] = {
+    pub const ALL: &'static [(Self, Cost); 10] = &{
         const fn cost(run: u32, piece: u32, pixel: u32) -> Cost {
             Cost { run, piece, pixel }
         }
@@ -142,6 +142,15 @@ impl Way {
         }
     }
 
+    /// Whether half a run of `len` pixels would gain by a single linear piece in place of this.
+    fn slow(self, len: u16) -> bool {
+        let own = Self::ALL.iter().find(|(way, _)| *way == self);
+        own.is_some_and(|&(way, cost)| {
+            let (whole, least) = Self::ALL[0];
+            way.cost(cost, len) > whole.cost(least, len) + 2 * HALVING
+        })
+    }
+
     /// The cheapest for the run that keeps to `tolerance`.
     pub fn cheapest(bend: &Bend, tolerance: Tolerance) -> Self {
         let keeps = |way: Self| way.bound(bend) <= tolerance.units();
@@ -161,33 +170,34 @@ impl Way {
             _ => false,
         };
         let order = &ORDERS[usize::from(bend.steps()).min(HEIGHT - 1)];
-        let ways = order.iter().map(|&way| Self::ALL[usize::from(way)].0);
-        ways.into_iter()
-            .find(|&way| !hopeless(way) && keeps(way))
-            .unwrap_or(Self::Exact)
+        for &way in order {
+            if !hopeless(way) && keeps(way) {
+                return way;
+            }
+        }
+        Self::Exact
     }
 }
 
 /// The ways but for the first, the cheapest first, for every number of steps.
-static ORDERS: [[u8; Way::ALL.len() - 1]; HEIGHT] = {
-    let mut orders = [[0; Way::ALL.len() - 1]; HEIGHT];
+static ORDERS: [[Way; Way::ALL.len() - 1]; HEIGHT] = {
+    let mut orders = [[Way::Exact; Way::ALL.len() - 1]; HEIGHT];
     let mut steps = 0;
     while steps < HEIGHT {
         let order = &mut orders[steps];
+        let mut costs = [0; Way::ALL.len() - 1];
         let mut way = 1;
         while way < Way::ALL.len() {
             let (new, cost) = Way::ALL[way];
             let cost = new.cost(cost, steps as u16 + 1);
             let mut place = way - 1;
-            while place > 0 {
-                let (before, its) = Way::ALL[order[place - 1] as usize];
-                if before.cost(its, steps as u16 + 1) <= cost {
-                    break;
-                }
+            while place > 0 && costs[place - 1] > cost {
                 order[place] = order[place - 1];
+                costs[place] = costs[place - 1];
                 place -= 1;
             }
-            order[place] = way as u8;
+            order[place] = new;
+            costs[place] = cost;
             way += 1;
         }
         steps += 1;
@@ -397,7 +407,7 @@ impl Within {
     ) {
         let bend = Bend::new(&walk, len, texture);
         let way = Way::cheapest(&bend, self.tolerance);
-        if way != Way::ALL[0].0 && len >= LEAST_HALVED && bend.leans(len / 2) {
+        if way != Way::Linear(Pieces::Whole) && way.slow(len) && bend.leans(len / 2) {
             let half = len / 2;
             self.cut(walk, y, half, texture, sink);
             walk.at = walk.after(half);

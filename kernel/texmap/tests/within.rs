@@ -172,7 +172,8 @@ fn within(least: u32, tolerance: &str) {
             // Nothing cheaper keeps to it, by its own bound.
             let keeps = |way: Way| way.bound(&bend) <= tolerance.units();
             let cheapest = Way::ALL
-                .into_iter()
+                .iter()
+                .copied()
                 .filter(|&(way, _)| keeps(way))
                 .min_by_key(|&(way, cost)| way.cost(cost, len))
                 .expect("the quotients are none off")
