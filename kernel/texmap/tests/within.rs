@@ -227,7 +227,12 @@ fn within(least: u32, tolerance: &str) {
         worst / f64::from(tolerance.units()) * 100.0,
         list.join(", ")
     );
-    assert!(ways.contains_key("flat") && ways.len() >= 4, "{ways:?}");
+    // Hardly any face is flat to 1/256 texel.
+    let rough = tolerance >= Tolerance::parse("1/4").unwrap();
+    assert!(
+        (ways.contains_key("flat") || !rough) && ways.len() >= 4,
+        "{ways:?}"
+    );
     assert!(worst >= 0.8 * f64::from(tolerance.units()));
 }
 
