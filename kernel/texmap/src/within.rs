@@ -259,15 +259,15 @@ impl Flat {
         let slope = |n: i64, step: i64, c_step: i64| {
             let d = passes((n, step), (c, c_step));
             let pace = inverse.pace(d.unsigned_abs());
-            let slope = pace.min(steep) as i64;
-            if d > 0 { -slope } else { slope }
+            let slope = (pace < steep).then_some(pace as i64)?;
+            Some(if d > 0 { -slope } else { slope })
         };
         let map = |at: i32, n: i64, form: crate::plane::Form| {
-            let right = slope(n, form.right, plane.c.right);
-            let down = slope(n, form.down, plane.c.down);
-            [i64::from(at) << 16, right, down]
+            let right = slope(n, form.right, plane.c.right)?;
+            let down = slope(n, form.down, plane.c.down)?;
+            Some([i64::from(at) << 16, right, down])
         };
-        let maps = [map(u, a, plane.a), map(v, b, plane.b)];
+        let maps = [map(u, a, plane.a)?, map(v, b, plane.b)?];
         // How far A, and c, get from their values in the middle.
         let (mut change, mut lean) = (0u64, 0u64);
         let mut corner = |x: i32, y: i32| {

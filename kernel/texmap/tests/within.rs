@@ -350,3 +350,44 @@ fn a_run_is_inside_its_polygon() {
         assert!(inside(&points, run.line.into(), run.first.into()));
     });
 }
+
+/// A sliver that faces the eye, with a texture squeezed into it: 320 texels from a pixel to the next,
+/// half as many back from a row to the next. Nothing leans, so only how steep it is speaks against one map.
+#[test]
+fn a_sliver_with_more_texels_a_pixel_than_a_texture_has_keeps_to_its_error() {
+    let texture = Texture::new(&[0; 256 * 256], 256, 256).unwrap();
+    let corners = [(99, 0, 0), (102, 240, 0), (142, 240, 240), (139, 0, 240)];
+    let corners = corners.map(|(x, u, v)| (x, if v == 0 { 100 } else { 180 }, u << 16, v << 16));
+    // In quarters of a pixel, before the middle of the screen.
+    let place = |(x, y, u, v)| Anchor {
+        position: [(x - 100) * 1024, (y - 100) * 1024, FOCAL_LENGTH << 12],
+        u,
+        v,
+    };
+    let [a, b, c, _] = corners.map(place);
+    let polygon = corners.map(|(x, y, u, v)| Vertex {
+        x: 160 * 256 + (x - 100) * 64,
+        y: 120 * 256 + (y - 100) * 64,
+        u,
+        v,
+    });
+    let face = Face {
+        polygon: &polygon,
+        texture: 0,
+        anchors: [a, b, c],
+        focal_length: FOCAL_LENGTH,
+    };
+    let mut pixels = 0;
+    for mapper in ["within-1", "within-1/256"] {
+        let jobs = Mapper::parse(mapper).unwrap().jobs(&face, &texture, |job| {
+            let forms = plane::Walk::new(&face.plane(), Axis::Down, job.x, job.y);
+            job.pixels(&texture, |(_, y), at| {
+                let off = off(&forms, y - job.y, at, (256, 256));
+                assert!(off <= 65536.0, "{off} at {y} of {job:?}");
+                pixels += 1;
+            });
+        });
+        jobs.unwrap();
+    }
+    assert!(pixels >= 20, "{pixels}");
+}
