@@ -9,7 +9,7 @@ use crystal_ball::dump::Dump;
 use crystal_ball::indexed::Indexed;
 use crystal_ball::screen::Screen;
 use link::dump::{Header, PLANE_BYTES};
-use link::{Content, Picture};
+use link::{Content, Picture, Word};
 use tempfile::TempDir;
 
 /// A folder of files to compare; the program runs in it.
@@ -78,7 +78,7 @@ fn dump(content: Content) -> Dump {
         header: Header {
             content,
             scene: "ball".into(),
-            mapper: "exact".into(),
+            mapper: Word::new("exact").unwrap(),
             picture: Some(Picture::Frame(480)),
             start: 0x4B00,
             width: 320,

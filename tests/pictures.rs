@@ -163,10 +163,7 @@ fn every_golden_is_what_the_oracle_draws() {
         // The committed picture.
         let picture = golden.picture().unwrap().expect("it was blessed");
         let affine = expected(&mut stage, &pose, Mapper::default());
-        let mapper = golden
-            .look
-            .mapper
-            .map_or(Mapper::default(), |named| named.0);
+        let mapper = golden.look.mapper.unwrap_or_default();
         let background = stage.background();
         match mapper {
             // Its fractions are shorter.

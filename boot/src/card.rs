@@ -6,10 +6,10 @@
 //! the DAC's read port, and its screen by QEMU. The emulated card is looked into from outside, and
 //! its geometry comes from its registers.
 
-use anyhow::{anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use emulator::Vga;
 use link::dump::{Header, PLANE_BYTES};
-use link::{Command, Content, ERROR, OK, Picture, Setting};
+use link::{Command, Content, ERROR, OK, Picture, Setting, Word};
 use show::{Memory, Show};
 
 use crate::dump::Dump;
@@ -67,8 +67,8 @@ pub struct Emulated<'a> {
     show: Show<'a, Vga>,
     scene: String,
     /// The mapper that is set, and the one that drew the picture.
-    mapper: String,
-    drawn_by: String,
+    mapper: Option<Word>,
+    drawn_by: Option<Word>,
     picture: Option<Picture>,
 }
 
@@ -81,8 +81,8 @@ impl<'a> Emulated<'a> {
         let mut this = Self {
             show: Show::new(memory, Vga::new()),
             scene: String::new(),
-            mapper: String::new(),
-            drawn_by: String::new(),
+            mapper: None,
+            drawn_by: None,
             picture: None,
         };
         this.ask(Command::Hold)?;
@@ -124,19 +124,17 @@ impl Card for Emulated<'_> {
                     Command::Hold => {
                         self.picture = None;
                         self.scene = self.state("scene")?;
-                        self.mapper = self.state("mapper")?;
-                        if self.drawn_by.is_empty() {
-                            self.drawn_by.clone_from(&self.mapper);
-                        }
+                        self.mapper = Word::new(&self.state("mapper")?);
+                        self.drawn_by = self.drawn_by.or(self.mapper);
                     }
-                    Command::Set(Setting::Mapper, Some(name)) => self.mapper = name.to_string(),
+                    Command::Set(Setting::Mapper, Some(name)) => self.mapper = Some(name),
                     Command::Set(Setting::Scene, Some(name)) => {
                         self.picture = None;
                         self.scene = name.to_string();
                     }
                     Command::Show(picture) => {
                         self.picture = Some(picture);
-                        self.drawn_by.clone_from(&self.mapper);
+                        self.drawn_by = self.mapper;
                     }
                     _ => {}
                 }
@@ -163,7 +161,7 @@ impl Card for Emulated<'_> {
             header: Header {
                 content,
                 scene: self.scene.clone(),
-                mapper: self.drawn_by.clone(),
+                mapper: self.drawn_by.context("the show was never held")?,
                 picture: self.picture,
                 start: page.start,
                 width: page.width.try_into()?,

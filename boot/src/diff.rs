@@ -327,7 +327,7 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
     };
     let fields = [
         ("scene", a.scene.clone(), b.scene.clone()),
-        ("mapper", a.mapper.clone(), b.mapper.clone()),
+        ("mapper", a.mapper.to_string(), b.mapper.to_string()),
         ("picture", picture(a.picture), picture(b.picture)),
         (
             "start",
@@ -761,8 +761,8 @@ fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
 
 #[cfg(test)]
 mod tests {
-    use link::Picture;
     use link::dump::Header;
+    use link::{Picture, Word};
 
     use super::*;
 
@@ -780,7 +780,7 @@ mod tests {
             header: Header {
                 content,
                 scene: "ball".into(),
-                mapper: "exact".into(),
+                mapper: Word::new("exact").unwrap(),
                 picture: Some(Picture::Frame(480)),
                 start: 0x4B00,
                 width: 320,

@@ -8,7 +8,7 @@ use std::fmt;
 use std::io::{self, Write};
 
 use link::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
-use link::{Content, Lines, Picture};
+use link::{Content, Lines, Picture, Word};
 use modex::Palette;
 
 use crate::indexed::Indexed;
@@ -261,7 +261,8 @@ impl<'a> Reader<'a> {
             other => return Err(format!("content is 'page' or 'memory', not '{other}'")),
         };
         let scene = self.line("scene")?.to_string();
-        let mapper = self.line("mapper")?.to_string();
+        let mapper = self.line("mapper")?;
+        let mapper = Word::new(mapper).ok_or_else(|| format!("'{mapper}' is no mapper's name"))?;
         let picture = match self.line("picture")? {
             "none" => None,
             name => Some(

@@ -125,8 +125,7 @@ impl Golden {
             mapper: (description.mapper)
                 .map(|name| Mapper::parse(&name).ok_or_else(|| unknown("mapper", name)))
                 .transpose()
-                .with_context(wrong)?
-                .map(Named),
+                .with_context(wrong)?,
             order: (description.order)
                 .map(|name| Order::parse(&name).ok_or_else(|| unknown("order", name)))
                 .transpose()

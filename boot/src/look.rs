@@ -1,8 +1,10 @@
 //! How pictures are drawn: what a user may choose of it, by name.
 
+use std::ffi::OsStr;
+use std::fmt::Display;
 use std::sync::LazyLock;
 
-use clap::builder::PossibleValue;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use link::{Command, Setting, Word};
 use scene::catalogue::{CATALOGUE, Entry};
@@ -15,8 +17,8 @@ pub struct Look {
     #[arg(long, global = true, value_name = "NAME")]
     pub scene: Option<Named<&'static Entry>>,
     /// How textures are mapped
-    #[arg(long, global = true, value_name = "NAME")]
-    pub mapper: Option<Named<Mapper>>,
+    #[arg(long, global = true, value_name = "NAME", value_parser = Mappers)]
+    pub mapper: Option<Mapper>,
     /// In which order the columns of a picture are drawn, and where to
     #[arg(long, global = true, value_name = "NAME")]
     pub order: Option<Named<Order>>,
@@ -25,10 +27,10 @@ pub struct Look {
 impl Look {
     /// The commands that set it, after [`Command::Hold`].
     pub fn commands(&self) -> impl Iterator<Item = Command> {
-        let set = |setting, name| Some(Command::Set(setting, Some(Word::new(name)?)));
-        let scene = self.scene.and_then(|s| set(Setting::Scene, s.0.name));
-        let mapper = self.mapper.and_then(|m| set(Setting::Mapper, m.0.name()));
-        let order = self.order.and_then(|o| set(Setting::Order, o.0.name()));
+        let set = |setting, name: &dyn Display| Some(Command::Set(setting, Some(Word::of(name)?)));
+        let scene = self.scene.and_then(|s| set(Setting::Scene, &s.0.name));
+        let mapper = self.mapper.and_then(|m| set(Setting::Mapper, &m));
+        let order = self.order.and_then(|o| set(Setting::Order, &o.0));
         scene.into_iter().chain(mapper).chain(order)
     }
 }
@@ -37,27 +39,33 @@ impl Look {
 #[derive(Clone, Copy, Debug)]
 pub struct Named<T>(pub T);
 
-/// All mappers, for clap's list.
-static MAPPERS: [Named<Mapper>; Mapper::ALL.len()] = {
-    let mut all = [Named(Mapper::Exact); Mapper::ALL.len()];
-    let mut i = 0;
-    while i < all.len() {
-        all[i] = Named(Mapper::ALL[i].1);
-        i += 1;
-    }
-    all
-};
+/// Mappers by name, those that are listed and those within any tolerance.
+#[derive(Clone)]
+struct Mappers;
 
-impl ValueEnum for Named<Mapper> {
-    fn value_variants<'a>() -> &'a [Self] {
-        &MAPPERS
+impl TypedValueParser for Mappers {
+    type Value = Mapper;
+
+    fn parse_ref(
+        &self,
+        command: &clap::Command,
+        argument: Option<&clap::Arg>,
+        value: &OsStr,
+    ) -> Result<Mapper, clap::Error> {
+        let names = PossibleValuesParser::new(Mapper::ALL.iter().map(|(name, ..)| *name));
+        match value.to_str().and_then(Mapper::parse) {
+            Some(mapper) => Ok(mapper),
+            None => Err(names
+                .parse_ref(command, argument, value)
+                .expect_err("a listed name is a mapper's")),
+        }
     }
 
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, _, about) = Mapper::ALL
-            .iter()
-            .find(|(_, mapper, _)| *mapper == self.0)?;
-        Some(PossibleValue::new(name).help(about))
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue>>> {
+        let named = Mapper::ALL.iter();
+        Some(Box::new(named.map(|(name, _, about)| {
+            PossibleValue::new(*name).help(*about)
+        })))
     }
 }
 
@@ -98,13 +106,9 @@ mod tests {
 
     #[test]
     fn every_name_is_a_value_and_a_word_on_the_line() {
-        let mappers = Named::<Mapper>::value_variants();
-        assert_eq!(mappers.len(), Mapper::ALL.len());
-        for (named, &(name, mapper, _)) in mappers.iter().zip(Mapper::ALL) {
-            assert_eq!(named.0, mapper);
-            let value = named.to_possible_value().unwrap();
-            assert_eq!(value.get_name(), name);
+        for &(name, mapper, _) in Mapper::ALL {
             assert_eq!(Mapper::parse(name), Some(mapper));
+            assert_eq!(mapper.to_string(), name);
             assert!(Word::new(name).is_some(), "{name}");
         }
         for entry in &CATALOGUE {

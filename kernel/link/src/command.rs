@@ -146,6 +146,23 @@ impl Word {
         Some(Self { bytes, len })
     }
 
+    /// The word that something is displayed as, if it is one.
+    pub fn of(named: impl fmt::Display) -> Option<Self> {
+        struct Text([u8; Word::MAX], usize);
+        impl fmt::Write for Text {
+            fn write_str(&mut self, text: &str) -> fmt::Result {
+                let end = self.1 + text.len();
+                let place = self.0.get_mut(self.1..end).ok_or(fmt::Error)?;
+                place.copy_from_slice(text.as_bytes());
+                self.1 = end;
+                Ok(())
+            }
+        }
+        let mut text = Text([0; Self::MAX], 0);
+        fmt::write(&mut text, format_args!("{named}")).ok()?;
+        Self::new(core::str::from_utf8(&text.0[..text.1]).ok()?)
+    }
+
     /// Its text.
     pub fn as_str(&self) -> &str {
         // ASCII, as `new` has seen.
@@ -353,6 +370,15 @@ mod tests {
             let framed = std::str::from_utf8(&framed).unwrap().trim_end();
             assert_eq!(Command::parse(&command.to_string()), Ok(command));
             assert_eq!(Command::parse(framed), Ok(command));
+        }
+    }
+
+    #[test]
+    fn a_word_is_what_is_displayed_if_it_is_one() {
+        assert_eq!(Word::of("within-1/2"), Word::new("within-1/2"));
+        assert_eq!(Word::of(format_args!("{}-{}", 1, 2)), Word::new("1-2"));
+        for no_word in ["", "two words", "a-name-of-25-characters-is", "\u{e9}"] {
+            assert_eq!((Word::of(no_word), Word::new(no_word)), (None, None));
         }
     }
 

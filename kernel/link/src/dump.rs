@@ -25,7 +25,7 @@
 
 use core::fmt;
 
-use crate::{Checksum, Content, Picture};
+use crate::{Checksum, Content, Picture, Word};
 
 /// Version of the format, in a dump's first line.
 pub const VERSION: u32 = 2;
@@ -45,8 +45,8 @@ pub struct Header<S> {
     pub content: Content,
     /// The scene's name, a word.
     pub scene: S,
-    /// The name of the mapper that drew it, a word.
-    pub mapper: S,
+    /// The name of the mapper that drew it.
+    pub mapper: Word,
     /// What is on the screen; nothing before the first picture.
     pub picture: Option<Picture>,
     /// The start address: where the page on the screen begins in each plane.
@@ -293,7 +293,7 @@ mod tests {
         Header {
             content,
             scene: "ball",
-            mapper: "exact",
+            mapper: Word::new("exact").unwrap(),
             picture: Some(Picture::Frame(u32::MAX)),
             start: 0x4B00,
             width: 320,

@@ -274,6 +274,10 @@ impl<'a, B: Bus> Show<'a, B> {
                 for &(name, mapper, about) in Mapper::ALL {
                     tell(mapper == self.stage.mapper(), name, about);
                 }
+                let set = self.stage.mapper();
+                if set.name().is_empty() {
+                    out(format_args!("*{set} as within-1, with another tolerance"));
+                }
             }
             Setting::Order => {
                 for (name, order, about) in Order::ALL {
@@ -300,7 +304,7 @@ impl<'a, B: Bus> Show<'a, B> {
         Header {
             content,
             scene: self.stage.name(),
-            mapper: self.mapper.name(),
+            mapper: Word::of(self.mapper).expect("a mapper's name is a word"),
             picture: self.picture,
             start: self.card.start_address(),
             width: WIDTH as u16,

@@ -90,6 +90,15 @@ impl Loop {
         )
     }
 
+    /// The fastest loop for padded textures on this CPU: bit-extract where there is one, else what
+    /// is fastest under QEMU's TCG.
+    pub fn fastest() -> Self {
+        match Self::Extract.is_tuned_here() {
+            true => Self::Extract,
+            false => Self::Shifts,
+        }
+    }
+
     /// Whether this CPU draws with the loop's own instructions, rather than with its portable
     /// twin. The texels are the same.
     pub fn is_tuned_here(self) -> bool {

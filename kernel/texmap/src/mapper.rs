@@ -230,7 +230,7 @@ impl Mapper {
         named.map(|&(_, mapper, _)| mapper)
     }
 
-    /// Its name; none for one that [`Mapper::ALL`] has not.
+    /// Its name in [`Mapper::ALL`]; empty for a tolerance that is not there. All are displayed.
     pub fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(_, mapper, _)| *mapper == self);
         named.map_or("", |(name, ..)| name)
@@ -238,7 +238,10 @@ impl Mapper {
 
     /// How its runs are drawn.
     pub fn style(self) -> Style {
-        let mut style = Style::default();
+        let mut style = Style {
+            affine: Loop::fastest(),
+            ..Style::default()
+        };
         match self {
             Self::Rows(rows) => style.rows = rows,
             Self::Affine(affine) => style.affine = affine,
