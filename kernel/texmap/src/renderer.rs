@@ -5,7 +5,7 @@ use core::fmt;
 use modex::Destination;
 
 use crate::mapper::{Face, Mapper};
-use crate::{JobList, Texture};
+use crate::{Job, JobList, Texture};
 
 /// What was drawn, and what was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -65,6 +65,36 @@ impl Order {
     pub fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(_, order, _)| *order == self);
         named.map_or("", |(name, ..)| name)
+    }
+
+    /// Draws jobs that `mapper` made, each with the texture that it names.
+    ///
+    /// # Panics
+    /// If there is no such texture.
+    pub fn draw<D: Destination>(
+        self,
+        jobs: &[Job],
+        textures: &[Texture<'_>],
+        destination: &mut D,
+        mapper: Mapper,
+    ) {
+        let style = mapper.style();
+        match self {
+            Self::Polygons => {
+                for job in jobs {
+                    job.draw(style, &textures[usize::from(job.texture)], destination);
+                }
+            }
+            Self::Planes | Self::Buffer => {
+                for plane in 0..4 {
+                    destination.select(plane);
+                    for job in jobs {
+                        let texture = &textures[usize::from(job.texture)];
+                        job.draw_in_plane(plane, style, texture, destination);
+                    }
+                }
+            }
+        }
     }
 }
 
@@ -160,22 +190,6 @@ fn draw<D: Destination, const N: usize>(
     order: Order,
 ) {
     const { assert!(N > 0, "a job list needs room for a job") };
-    let style = mapper.style();
-    match order {
-        Order::Polygons => {
-            for job in jobs.jobs() {
-                job.draw(style, &textures[usize::from(job.texture)], destination);
-            }
-        }
-        Order::Planes | Order::Buffer => {
-            for plane in 0..4 {
-                destination.select(plane);
-                for job in jobs.jobs() {
-                    let texture = &textures[usize::from(job.texture)];
-                    job.draw_in_plane(plane, style, texture, destination);
-                }
-            }
-        }
-    }
+    order.draw(jobs.jobs(), textures, destination, mapper);
     jobs.clear();
 }
