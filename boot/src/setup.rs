@@ -22,6 +22,7 @@ mod qemu;
 mod rustup;
 mod toolchain;
 
+use build::Program;
 pub use build::root;
 use cache::Cache;
 pub use progress::{Step, say};
@@ -61,10 +62,22 @@ pub fn folder() -> PathBuf {
 /// When a part cannot be had: the message says what was tried, why it failed and what to do by hand.
 /// [`Interrupted`](crate::child::Interrupted) when the user stopped it.
 pub fn ready(options: &Options) -> anyhow::Result<Ready> {
+    ready_with(options, Program::Show)
+}
+
+/// The same for the program that measures, which has an image of its own.
+///
+/// # Errors
+/// As [`ready`].
+pub fn ready_to_measure(options: &Options) -> anyhow::Result<Ready> {
+    ready_with(options, Program::Measure)
+}
+
+fn ready_with(options: &Options, program: Program) -> anyhow::Result<Ready> {
     let cache = Cache::find()?.lock()?;
     // First, because it fails at once or asks a question, and the rest takes minutes.
     let qemu = qemu::get(options)?;
-    let (kernel, image) = boot_files(&cache, options)?;
+    let (kernel, image) = boot_files(&cache, options, program)?;
     Ok(Ready {
         image,
         kernel,
@@ -77,16 +90,20 @@ pub fn ready(options: &Options) -> anyhow::Result<Ready> {
 /// # Errors
 /// As [`ready`].
 pub fn image(options: &Options) -> anyhow::Result<PathBuf> {
-    Ok(boot_files(&Cache::find()?.lock()?, options)?.1)
+    Ok(boot_files(&Cache::find()?.lock()?, options, Program::Show)?.1)
 }
 
-fn boot_files(cache: &cache::Locked, options: &Options) -> anyhow::Result<(PathBuf, PathBuf)> {
+fn boot_files(
+    cache: &cache::Locked,
+    options: &Options,
+    program: Program,
+) -> anyhow::Result<(PathBuf, PathBuf)> {
     // Without a cargo the rest would be for nothing: this is known before the downloads.
     build::cargo_path()?;
     let toolchain = toolchain::get(cache, options)?;
     let maker = build::image_maker(cache, &toolchain)?;
-    let kernel = build::kernel(&toolchain)?;
-    let image = build::image(&maker, &kernel)?;
+    let kernel = build::kernel(&toolchain, program)?;
+    let image = build::image(&maker, program)?;
     Ok((kernel, image))
 }
 

@@ -1,5 +1,6 @@
 //! The machine's edge: everything that is reached through ports, physical memory or interrupts.
 
+pub mod clock;
 mod cpu;
 mod ports;
 pub mod report;
@@ -9,13 +10,22 @@ mod vga;
 
 use core::ptr::NonNull;
 
-use bootloader_api::BootInfo;
+use bootloader_api::config::Mapping;
+use bootloader_api::{BootInfo, BootloaderConfig};
 use link::{Exit, HELLO, PROTOCOL};
 
 pub use vga::Window;
 
 /// Where the card's window lies in physical memory.
 const WINDOW: u64 = 0xA_0000;
+
+/// What a program of this machine asks of the boot loader.
+pub const BOOT: BootloaderConfig = {
+    let mut config = BootloaderConfig::new_default();
+    // The boot loader maps no video memory by itself: it lies in the physical memory at A0000h.
+    config.mappings.physical_memory = Some(Mapping::Dynamic);
+    config
+};
 
 /// The machine, ready: exceptions are reported, ticks count, the serial line works.
 #[derive(Debug)]
@@ -55,6 +65,11 @@ pub fn sleep_while(idle: impl FnOnce() -> bool) {
     } else {
         x86_64::instructions::interrupts::enable();
     }
+}
+
+/// Does something that no interrupt gets in between of.
+pub fn undisturbed<T>(work: impl FnOnce() -> T) -> T {
+    x86_64::instructions::interrupts::without_interrupts(work)
 }
 
 /// Ends QEMU with `exit`'s code; on a machine without its exit device, stops for good.

@@ -2,17 +2,16 @@
 //!
 //! It is the machine's edge, and no more: ports, video memory, interrupts, the serial line, all in
 //! [`machine`] and with all of the kernel's `unsafe`. The program that draws pictures and answers
-//! commands is the crate [`show`], which runs on the host as well. Whatever goes wrong is reported on the serial line in words and ends QEMU with a code of its
-//! own; the kernel never restarts by itself.
+//! commands is the crate [`show`], which runs on the host as well. Whatever goes wrong is reported
+//! on the serial line in words and ends QEMU with a code of its own; the kernel never restarts by
+//! itself.
 //!
 //! All of it compiles for the host as well, where it says what to do instead; only the entry
 //! point and the panic handler are the bare machine's. So clippy and editors see every line.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-mod machine;
-
-use bootloader_api::{BootInfo, BootloaderConfig, config::Mapping};
-use machine::{serial, timer};
+use bootloader_api::{BootInfo, BootloaderConfig};
+use crystal_ball_kernel::machine::{self, serial, timer};
 use show::{Memory, Request, Show};
 use spin::Mutex;
 
@@ -20,12 +19,7 @@ use spin::Mutex;
 static MEMORY: Mutex<Memory> = Mutex::new(Memory::new());
 
 /// What the kernel asks of the boot loader.
-static BOOT: BootloaderConfig = {
-    let mut config = BootloaderConfig::new_default();
-    // The boot loader maps no video memory by itself: it lies in the physical memory at A0000h.
-    config.mappings.physical_memory = Some(Mapping::Dynamic);
-    config
-};
+static BOOT: BootloaderConfig = machine::BOOT;
 
 fn start(boot_info: &'static mut BootInfo) -> ! {
     let machine = machine::init(boot_info);

@@ -18,10 +18,36 @@ use super::progress::Step;
 use super::toolchain::Toolchain;
 use crate::child::{self, Event};
 
-const KERNEL: &str = "crystal-ball-kernel";
+const PACKAGE: &str = "crystal-ball-kernel";
 const TARGET: &str = "x86_64-unknown-none";
-const IMAGE: &str = "crystal-ball.img";
 const IMAGE_MAKER: &str = "crystal-ball-image";
+
+/// A program of the bare machine, with an image of its own.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Program {
+    /// The show.
+    Show,
+    /// The one that measures.
+    Measure,
+}
+
+impl Program {
+    /// The binary in the kernel's package.
+    fn binary(self) -> &'static str {
+        match self {
+            Self::Show => "crystal-ball-kernel",
+            Self::Measure => "crystal-ball-measure",
+        }
+    }
+
+    /// The image's file.
+    fn image(self) -> &'static str {
+        match self {
+            Self::Show => "crystal-ball.img",
+            Self::Measure => "measure.img",
+        }
+    }
+}
 
 /// The workspace's root.
 pub fn root() -> &'static Path {
@@ -49,24 +75,26 @@ pub fn folders() -> [PathBuf; 2] {
     [target().join("kernel"), target().join("crystal-ball")]
 }
 
-/// The kernel and the image of this workspace, whether or not they exist.
-pub fn files() -> [PathBuf; 2] {
+/// A program's kernel and image in this workspace, whether or not they exist.
+pub fn files(program: Program) -> [PathBuf; 2] {
     let [kernel, image] = folders();
     [
-        kernel.join(TARGET).join("release").join(KERNEL),
-        image.join(IMAGE),
+        kernel.join(TARGET).join("release").join(program.binary()),
+        image.join(program.image()),
     ]
 }
 
-/// Builds the kernel.
-pub fn kernel(toolchain: &Toolchain) -> anyhow::Result<PathBuf> {
+/// Builds a program's kernel.
+pub fn kernel(toolchain: &Toolchain, program: Program) -> anyhow::Result<PathBuf> {
     let mut cargo = cargo(toolchain)?;
     cargo.current_dir(root()).args([
         "build",
         "--release",
         "--locked",
         "-p",
-        KERNEL,
+        PACKAGE,
+        "--bin",
+        program.binary(),
         "--target",
         TARGET,
     ]);
@@ -82,7 +110,8 @@ pub fn kernel(toolchain: &Toolchain) -> anyhow::Result<PathBuf> {
             toolchain.release()
         ),
     )?;
-    Ok(files()[0].clone())
+    let [kernel, _] = files(program);
+    Ok(kernel)
 }
 
 /// The program that makes images, for this compiler: from the cache, or built (by far the longest step).
@@ -139,16 +168,16 @@ pub fn is_whole(place: &Path) -> bool {
 }
 
 /// Makes the image. Always: it takes a tenth of a second, and an image of another kernel would be worse.
-pub fn image(maker: &Path, kernel: &Path) -> anyhow::Result<PathBuf> {
+pub fn image(maker: &Path, program: Program) -> anyhow::Result<PathBuf> {
+    let [kernel, image] = files(program);
     let [_, folder] = folders();
     fs::create_dir_all(&folder)?;
     let aside = tempfile::Builder::new()
         .prefix(".aside")
         .tempdir_in(&folder)?;
-    let made = aside.path().join(IMAGE);
-    child::run(child::command(maker).arg(kernel).arg(&made))
+    let made = aside.path().join(program.image());
+    child::run(child::command(maker).arg(&kernel).arg(&made))
         .context("the disk image cannot be made")?;
-    let [_, image] = files();
     // Others may be booting the old one: they keep it, this is a new file.
     fs::rename(made, &image).with_context(|| format!("{} cannot be written", image.display()))?;
     Ok(image)

@@ -26,7 +26,10 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
             there(build::is_whole(&maker).then(|| maker.display().to_string())),
         ));
     }
-    for (what, file) in ["kernel", "disk image"].into_iter().zip(build::files()) {
+    for (what, file) in ["kernel", "disk image"]
+        .into_iter()
+        .zip(build::files(build::Program::Show))
+    {
         let found = file
             .exists()
             .then(|| format!("{}, {}", file.display(), bytes(cache::size(&file))));

@@ -1,0 +1,224 @@
+//! What is asked, and how figures are written.
+
+use core::fmt;
+
+use link::{FrameError, unframe};
+use texmap::{Mapper, Order};
+
+/// Most rounds of one measurement.
+pub const MAX_ROUNDS: usize = 15;
+
+/// Something to measure, as it stands on a line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ask {
+    /// `calibrate`: the clock against a known number of instructions.
+    Calibrate,
+    /// `measure MAPPER ORDER ROUNDS`: each [`crate::Work`], in rounds, after one that is not told.
+    Measure(Mapper, Order, usize),
+    /// `runs MAPPER ORDER ROUNDS`: faces whose runs are all of one length, in RAM.
+    Runs(Mapper, Order, usize),
+    /// `check MAPPER ORDER`: what each work draws.
+    Check(Mapper, Order),
+    /// `leave`: end QEMU with the code for success.
+    Leave,
+}
+
+/// Why a line asks for nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AskError {
+    /// It is none of the five.
+    Unknown,
+    /// It has a checksum, and it is wrong.
+    Checksum(FrameError),
+}
+
+impl fmt::Display for AskError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Unknown => write!(
+                f,
+                "there are calibrate, measure MAPPER ORDER ROUNDS, runs MAPPER ORDER ROUNDS, \
+                 check MAPPER ORDER, leave; rounds are 1 to {MAX_ROUNDS}"
+            ),
+            Self::Checksum(error) => error.fmt(f),
+        }
+    }
+}
+
+impl Ask {
+    /// Reads a line, its checksum checked if it has one.
+    ///
+    /// # Errors
+    /// A line that asks for nothing.
+    pub fn parse(line: &str) -> Result<Self, AskError> {
+        let text = match unframe(line) {
+            Ok(text) => text,
+            Err(FrameError::NoChecksum) => line,
+            Err(wrong) => return Err(AskError::Checksum(wrong)),
+        };
+        Self::words(text.split(' ')).ok_or(AskError::Unknown)
+    }
+
+    fn words<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
+        let ask = words.next()?;
+        let mut how = || Some((Mapper::parse(words.next()?)?, Order::parse(words.next()?)?));
+        let mut ask = match ask {
+            "calibrate" => Self::Calibrate,
+            "leave" => Self::Leave,
+            "measure" => how().map(|(mapper, order)| Self::Measure(mapper, order, 0))?,
+            "runs" => how().map(|(mapper, order)| Self::Runs(mapper, order, 0))?,
+            "check" => how().map(|(mapper, order)| Self::Check(mapper, order))?,
+            _ => return None,
+        };
+        if let Self::Measure(_, _, rounds) | Self::Runs(_, _, rounds) = &mut ask {
+            *rounds = words.next()?.parse().ok()?;
+            if !(1..=MAX_ROUNDS).contains(rounds) {
+                return None;
+            }
+        }
+        words.next().is_none().then_some(ask)
+    }
+}
+
+impl fmt::Display for Ask {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Calibrate => f.write_str("calibrate"),
+            Self::Measure(mapper, order, rounds) => write!(f, "measure {mapper} {order} {rounds}"),
+            Self::Runs(mapper, order, rounds) => write!(f, "runs {mapper} {order} {rounds}"),
+            Self::Check(mapper, order) => write!(f, "check {mapper} {order}"),
+            Self::Leave => f.write_str("leave"),
+        }
+    }
+}
+
+/// What a piece of work took, round by round.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Figure {
+    pixels: u64,
+    ticks: [u64; MAX_ROUNDS],
+    rounds: usize,
+}
+
+impl Figure {
+    /// Of work that draws `pixels` pixels a round.
+    pub fn new(pixels: u64) -> Self {
+        Self {
+            pixels,
+            ..Self::default()
+        }
+    }
+
+    /// Adds a round.
+    ///
+    /// # Panics
+    /// If there are [`MAX_ROUNDS`] already.
+    pub fn add(&mut self, ticks: u64) {
+        self.ticks[self.rounds] = ticks;
+        self.rounds += 1;
+    }
+
+    /// Pixels of a round.
+    pub fn pixels(&self) -> u64 {
+        self.pixels
+    }
+
+    /// The clock's ticks of each round.
+    pub fn ticks(&self) -> &[u64] {
+        &self.ticks[..self.rounds]
+    }
+
+    /// Reads `pixels P ticks T ...`, as [`fmt::Display`] writes it.
+    pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
+        let number = |word: &str| -> Option<u64> {
+            let digits = word.bytes().all(|b| b.is_ascii_digit());
+            word.parse().ok().filter(|_| digits)
+        };
+        if words.next() != Some("pixels") {
+            return None;
+        }
+        let mut figure = Self::new(number(words.next()?)?);
+        if words.next() != Some("ticks") {
+            return None;
+        }
+        for word in words {
+            if figure.rounds == MAX_ROUNDS {
+                return None;
+            }
+            figure.add(number(word)?);
+        }
+        (figure.rounds > 0).then_some(figure)
+    }
+}
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "pixels {} ticks", self.pixels)?;
+        self.ticks().iter().try_for_each(|n| write!(f, " {n}"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::string::ToString;
+
+    #[test]
+    fn every_ask_comes_back() {
+        let mut asks = std::vec![Ask::Calibrate, Ask::Leave];
+        for &(_, mapper, _) in Mapper::ALL {
+            for (_, order, _) in Order::ALL {
+                asks.push(Ask::Measure(mapper, order, 5));
+                asks.push(Ask::Runs(mapper, order, MAX_ROUNDS));
+                asks.push(Ask::Check(mapper, order));
+            }
+        }
+        for ask in asks {
+            assert_eq!(Ask::parse(&ask.to_string()), Ok(ask));
+        }
+    }
+
+    #[test]
+    fn what_asks_for_nothing_is_refused() {
+        for line in [
+            "",
+            "measure",
+            "measure affine",
+            "measure affine planes",
+            "measure affine planes 0",
+            "measure affine planes 16",
+            "measure affine planes 5 5",
+            "measure nothing planes 5",
+            "measure affine sideways 5",
+            "check affine planes 5",
+            "calibrate 1",
+            "leave now",
+            "show 480",
+        ] {
+            assert_eq!(Ask::parse(line), Err(AskError::Unknown), "{line:?}");
+        }
+        let wrong = Ask::parse("leave *00000000");
+        assert!(matches!(wrong, Err(AskError::Checksum(_))));
+    }
+
+    #[test]
+    fn a_figure_comes_back() {
+        let mut figure = Figure::new(76_800);
+        for ticks in [0, 7, u64::MAX] {
+            figure.add(ticks);
+        }
+        let text = figure.to_string();
+        assert_eq!(text, "pixels 76800 ticks 0 7 18446744073709551615");
+        assert_eq!(Figure::parse(text.split(' ')), Some(figure));
+        for wrong in [
+            "pixels 1 ticks",
+            "pixels 1",
+            "pixels -1 ticks 1",
+            "pixels 1 ticks +1",
+            "",
+        ] {
+            assert_eq!(Figure::parse(wrong.split(' ')), None, "{wrong:?}");
+        }
+    }
+}

@@ -1,0 +1,96 @@
+//! One face that fills the screen, at an angle: work for the loops and little else.
+
+use modex::{HEIGHT, WIDTH};
+use texmap::coverage::Axis;
+use texmap::plane::{Anchor, Plane, Walk, coordinate};
+use texmap::{Face, SUBPIXELS, Texture, Vertex};
+
+/// Side of the texture.
+const SIDE: u16 = Texture::MAX_SIDE;
+/// Texels in it.
+pub const TEXELS: usize = SIDE as usize * SIDE as usize;
+
+/// In 1/64 unit: the texture's middle is 4 units before the eye, its axes are turned by 30 degrees
+/// about the line of sight, and both lead away from the viewer. About half a texel a pixel; depths
+/// on the screen are within a ratio of 1.3, and its corners inside the texture.
+const MIDDLE: [i32; 3] = [0, 0, 256];
+/// From the left border of the texture to the right one.
+const ACROSS: [i32; 3] = [440, 254, 77];
+/// From its top to its bottom.
+const DOWN: [i32; 3] = [-254, 440, 38];
+/// 16.16 of 1/64.
+const UNIT: i32 = 1 << 10;
+
+const FOCAL_LENGTH: i32 = scene::FOCAL_LENGTH;
+
+/// The face, and the pattern of its texture.
+#[derive(Clone, Copy, Debug)]
+pub struct Screen {
+    polygon: [Vertex; 4],
+    anchors: [Anchor; 3],
+}
+
+impl Screen {
+    /// With its corners where the texture's plane has them: affine mappers and those in perspective
+    /// walk the same part of the texture.
+    pub fn new() -> Self {
+        let anchors = [(0, 0), (SIDE, 0), (0, SIDE)].map(|(u, v)| {
+            let part = |k: usize, side: u16, axis: [i32; 3]| match side {
+                0 => -axis[k] * UNIT / 2,
+                _ => axis[k] * UNIT / 2,
+            };
+            Anchor {
+                position: [0, 1, 2]
+                    .map(|k| MIDDLE[k] * UNIT + part(k, u, ACROSS) + part(k, v, DOWN)),
+                u: i32::from(u) << 16,
+                v: i32::from(v) << 16,
+            }
+        });
+        let plane = Plane::new(&anchors, FOCAL_LENGTH);
+        let (right, bottom) = (WIDTH as u16, HEIGHT as u16);
+        let corners = [(0, 0), (right, 0), (right, bottom), (0, bottom)];
+        let polygon = corners.map(|(x, y)| {
+            // At the centre of the corner's pixel: half a pixel inwards.
+            let pixel = (x.min(right - 1), y.min(bottom - 1));
+            let [a, b, c] = Walk::new(&plane, Axis::Down, pixel.0, pixel.1).at;
+            Vertex {
+                x: i32::from(x) * SUBPIXELS,
+                y: i32::from(y) * SUBPIXELS,
+                u: coordinate(a, c, SIDE),
+                v: coordinate(b, c, SIDE),
+            }
+        });
+        Self { polygon, anchors }
+    }
+
+    /// The face, with texture 0.
+    pub fn face(&self) -> Face<'_> {
+        Face {
+            polygon: &self.polygon,
+            texture: 0,
+            anchors: self.anchors,
+            focal_length: FOCAL_LENGTH,
+        }
+    }
+
+    /// Its part that is `width` x `height` pixels at the top left, for runs of such lengths. The
+    /// texture is squeezed with it: what a run costs does not depend on that.
+    pub fn part(&self, width: u16, height: u16) -> Self {
+        let mut part = *self;
+        for vertex in &mut part.polygon {
+            vertex.x = vertex.x.min(i32::from(width) * SUBPIXELS);
+            vertex.y = vertex.y.min(i32::from(height) * SUBPIXELS);
+        }
+        part
+    }
+}
+
+/// Paints the texture: no two neighbours are alike.
+pub fn paint(texels: &mut [u8; TEXELS]) -> Texture<'_> {
+    for (j, row) in (0..=u8::MAX).zip(texels.chunks_exact_mut(SIDE.into())) {
+        for (i, texel) in (0..=u8::MAX).zip(row) {
+            *texel = i.wrapping_mul(3) ^ j.wrapping_mul(5);
+        }
+    }
+    Texture::padded(texels, SIDE, SIDE).expect("there are 256 x 256 texels")
+}

@@ -1,0 +1,56 @@
+//! The measuring kernel: what drawing costs on the bare machine.
+//!
+//! A program beside the show, from the same crates and with an image of its own. The crate [`cost`]
+//! does the work, and names what can be asked for; here are the machine's card, its time stamp
+//! counter and its serial line. Interrupts are off from an ask to the end of its answer.
+#![cfg_attr(target_os = "none", no_std, no_main)]
+
+use bootloader_api::{BootInfo, BootloaderConfig};
+use cost::{Bench, Clock, Memory};
+use crystal_ball_kernel::machine::{self, clock, serial};
+use spin::Mutex;
+
+/// The fixed memory of the program.
+static MEMORY: Mutex<Memory> = Mutex::new(Memory::new());
+
+/// What the kernel asks of the boot loader.
+static BOOT: BootloaderConfig = machine::BOOT;
+
+fn start(boot_info: &'static mut BootInfo) -> ! {
+    let machine = machine::init(boot_info);
+    let mut memory = MEMORY.lock();
+    let mut bench = Bench::new(&mut memory, machine.vga);
+    let clock = Clock {
+        now: clock::now,
+        instructions: clock::instructions,
+        bmi2: clock::has_bmi2(),
+    };
+    let out: &mut cost::Out<'_> = &mut |line| serial::line(line);
+    loop {
+        while let Some(byte) = serial::receive() {
+            if machine::undisturbed(|| bench.receive(byte, &clock, out)) {
+                machine::exit(link::Exit::Left);
+            }
+        }
+        machine::sleep_while(|| !serial::has_received());
+    }
+}
+
+#[cfg(target_os = "none")]
+bootloader_api::entry_point!(start, config = &BOOT);
+
+#[cfg(target_os = "none")]
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    machine::report::panic(info)
+}
+
+#[cfg(not(target_os = "none"))]
+fn main() {
+    // The kernel's code is reached from here too, so that the host's compiler checks all of it.
+    let kernel: (fn(&'static mut BootInfo) -> !, _) = (start, &BOOT);
+    let report = machine::report::panic;
+    core::hint::black_box((kernel, report));
+    eprintln!("this is the bare machine's program: the host program boots it to measure");
+    std::process::exit(2);
+}
