@@ -10,6 +10,7 @@ pub mod golden;
 pub mod indexed;
 pub mod look;
 pub mod machine;
+pub mod measure;
 pub mod report;
 pub mod screen;
 pub mod setup;

@@ -1,0 +1,193 @@
+//! What drawing does to the card, counted on the emulated one.
+//!
+//! The measuring kernel counts nothing while it takes time. The same work done here, on a card that
+//! is looked into from outside, says how often the card is reached; and that the kernel drew the same
+//! pictures says that it was the same work.
+
+use anyhow::{bail, ensure};
+use cost::{Ask, Bench, Clock, Memory, Work};
+use emulator::Vga;
+use modex::{Bus, Counted, Counts, Lane, Purpose, Tally};
+use texmap::{Mapper, Order};
+
+/// What a picture of the ball does to the card.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Accesses {
+    /// Port writes and stores that draw, or present what was drawn in RAM.
+    pub draw: Tally,
+    /// Those that restore the background.
+    pub erase: Tally,
+    /// Those that flip.
+    pub flip: Tally,
+    /// Loads from video memory, for whatever purpose.
+    pub loads: u64,
+}
+
+/// What the benches on the emulated card borrow.
+#[derive(Debug, Default)]
+pub struct Memories {
+    counted: Box<Memory>,
+    plain: Box<Memory>,
+}
+
+/// The measuring kernel's works on the emulated card, with counters and without.
+#[derive(Debug)]
+pub struct Emulated<'a> {
+    counted: Bench<'a, Counted<Loads<Vga>>>,
+    plain: Bench<'a, Vga>,
+}
+
+/// Nobody takes the time here.
+const NO_CLOCK: Clock = Clock {
+    now: || 0,
+    instructions: |_| (),
+    bmi2: false,
+};
+
+impl<'a> Emulated<'a> {
+    /// Cards as after the mode set.
+    pub fn new(memories: &'a mut Memories) -> Self {
+        let counted = Counted::new(Loads::new(Vga::new()));
+        Self {
+            counted: Bench::new(&mut memories.counted, counted),
+            plain: Bench::new(&mut memories.plain, Vga::new()),
+        }
+    }
+
+    /// What a picture of the ball, frame [`cost::FRAME`], does to the card: drawn by a mapper in an
+    /// order, on a page that holds the same picture before.
+    ///
+    /// # Errors
+    /// Accesses at fault, and counts that differ from picture to picture.
+    pub fn accesses(&mut self, mapper: Mapper, order: Order) -> anyhow::Result<Accesses> {
+        let work = super::whole_frame(order);
+        let bench = &mut self.counted;
+        bench.set(mapper, order);
+        // It has the ball on every page.
+        bench.prepare(Work::Present);
+        let mut one = || {
+            bench.bus().take_counts();
+            let loads = bench.bus().inner().loads;
+            bench.run(work, NO_CLOCK.now);
+            let loads = bench.bus().inner().loads - loads;
+            (bench.bus().take_counts(), loads)
+        };
+        let (counts, again) = (one(), one());
+        let faults = bench.bus().inner().bus.take_faults();
+        if let Some(fault) = faults.first() {
+            bail!("the emulated card finds an access at fault: {fault}");
+        }
+        ensure!(
+            counts == again,
+            "the accesses of {mapper} in the order {order} do not repeat: {counts:?}, {again:?}"
+        );
+        let (
+            Counts {
+                draw, erase, flip, ..
+            },
+            loads,
+        ) = counts;
+        let pictures = u64::from(work.pictures());
+        let each = |tally: Tally| Tally {
+            ports: tally.ports / pictures,
+            map_mask: tally.map_mask / pictures,
+            stores: tally.stores / pictures,
+            bytes: tally.bytes / pictures,
+        };
+        Ok(Accesses {
+            draw: each(draw),
+            erase: each(erase),
+            flip: each(flip),
+            loads: loads / pictures,
+        })
+    }
+
+    /// The checksums of what each work draws, in the measuring kernel's words: on a card without a
+    /// counter and on one behind counters.
+    ///
+    /// # Errors
+    /// Accesses at fault.
+    pub fn checksums(&mut self, mapper: Mapper, order: Order) -> anyhow::Result<[Vec<String>; 2]> {
+        let plain = check(&mut self.plain, mapper, order);
+        let counted = check(&mut self.counted, mapper, order);
+        let mut faults = self.plain.bus().take_faults();
+        faults.append(&mut self.counted.bus().inner().bus.take_faults());
+        if let Some(fault) = faults.first() {
+            bail!("the emulated card finds an access at fault: {fault}");
+        }
+        Ok([plain, counted])
+    }
+
+    /// Compares checksums that the kernel told with those of the emulated card.
+    ///
+    /// # Errors
+    /// A picture that differs.
+    pub fn compare(&mut self, mapper: Mapper, order: Order, told: &[String]) -> anyhow::Result<()> {
+        for emulated in self.checksums(mapper, order)? {
+            ensure!(
+                told == emulated,
+                "{mapper} in the order {order} draws {told:?} in QEMU and {emulated:?} on the \
+                 emulated card"
+            );
+        }
+        Ok(())
+    }
+}
+
+/// The lines of the answer to `check`, without the one that closes it.
+fn check<B: Bus>(bench: &mut Bench<'_, B>, mapper: Mapper, order: Order) -> Vec<String> {
+    let mut answer = Vec::new();
+    bench.answer(Ask::Check(mapper, order), &NO_CLOCK, &mut |line| {
+        answer.push(line.to_string());
+    });
+    answer.pop();
+    answer
+}
+
+/// A bus that passes everything on and counts the loads.
+#[derive(Debug)]
+struct Loads<B> {
+    bus: B,
+    loads: u64,
+}
+
+impl<B> Loads<B> {
+    fn new(bus: B) -> Self {
+        Self { bus, loads: 0 }
+    }
+}
+
+impl<B: Bus> Bus for Loads<B> {
+    fn out8(&mut self, port: u16, value: u8) {
+        self.bus.out8(port, value);
+    }
+
+    fn out16(&mut self, port: u16, value: u16) {
+        self.bus.out16(port, value);
+    }
+
+    fn in8(&mut self, port: u16) -> u8 {
+        self.bus.in8(port)
+    }
+
+    fn in16(&mut self, port: u16) -> u16 {
+        self.bus.in16(port)
+    }
+
+    fn store64(&mut self, at: u16, bytes: u64) {
+        self.bus.store64(at, bytes);
+    }
+
+    fn load8(&mut self, at: u16) -> u8 {
+        self.loads += 1;
+        self.bus.load8(at)
+    }
+
+    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
+        self.bus.lane(at, len, draw);
+    }
+
+    fn purpose(&mut self, purpose: Purpose) {
+        self.bus.purpose(purpose);
+    }
+}

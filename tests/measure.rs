@@ -1,0 +1,179 @@
+//! The measuring kernel in real QEMU, and what is counted beside it.
+
+use std::fmt::Write;
+
+use cost::Work;
+use crystal_ball::measure::{self, Config, Cpu, Emulated, Measured, Memories};
+use texmap::{Mapper, Order};
+
+/// The mappers of the names.
+fn mappers(names: &[&str]) -> Vec<Mapper> {
+    let named = names.iter().map(|name| Mapper::parse(name));
+    named.map(|mapper| mapper.expect("a mapper")).collect()
+}
+
+/// One mapper of each kind. The run itself makes sure that figures repeat under `-icount`, that
+/// pixels are as many without it, and that QEMU and the emulated card hold the same pictures.
+#[test]
+fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
+    let names = ["row-passes", "affine", "exact"];
+    let measured = measure::run(&Config {
+        cpus: vec![Cpu::Baseline],
+        mappers: mappers(&names),
+        rounds: 1,
+        ..Config::default()
+    })
+    .unwrap();
+    let [cpu] = &measured.cpus[..] else {
+        panic!("one CPU model was asked for");
+    };
+    assert_eq!(cpu.rows.len(), names.len() * Order::ALL.len());
+    assert!(!cpu.bmi2, "{} has no BMI2", cpu.cpu);
+    let screen = (modex::WIDTH * modex::HEIGHT) as u64;
+    for row in &cpu.rows {
+        let name = format!("{} {}", row.mapper, row.order);
+        let a_pixel = |work| row.cost(work).instructions_a_pixel();
+        for work in [
+            Work::BareRam,
+            Work::BareCard,
+            Work::ScreenRam,
+            Work::ScreenCard,
+        ] {
+            assert_eq!(row.cost(work).pixels, screen, "{name}: {work}");
+        }
+        // A store, and a part of a counter and a branch, or more of it where nothing is unrolled.
+        for work in [Work::BareRam, Work::BareCard] {
+            let bare = a_pixel(work);
+            assert!((1.0..4.5).contains(&bare), "{name}: {work} {bare}");
+        }
+        // Eight bytes a store, a loop for each, and more of them than there are pixels.
+        let present = a_pixel(Work::Present);
+        assert!((0.2..8.0).contains(&present), "{name}: {present}");
+        // Texel, step and store at the least; the clear twins are no more than slow.
+        let drawn = row.instructions_a_pixel();
+        assert!((3.0..400.0).contains(&drawn), "{name}: {drawn}");
+        // Each is a part of the next.
+        let parts = [
+            Work::FrameFaces,
+            Work::FrameJobs,
+            Work::FrameDrawCard,
+            Work::FrameCard,
+        ];
+        for pair in parts.windows(2) {
+            assert!(a_pixel(pair[0]) < a_pixel(pair[1]), "{name}: {pair:?}");
+        }
+        // What draws the same takes the same on either side of the card's window, but for Map Mask.
+        assert!(
+            a_pixel(Work::ScreenRam) <= a_pixel(Work::ScreenCard),
+            "{name}"
+        );
+        assert_eq!(row.runs.len(), cost::LENGTHS.len());
+        for run in &row.runs {
+            let length = run.length;
+            assert_eq!(run.draw.pixels % u64::from(length), 0, "{name}: {length}");
+            assert_eq!(run.draw.pixels, run.jobs.pixels, "{name}: {length}");
+        }
+        let (shortest, longest) = (&row.runs[0].draw, &row.runs[cost::LENGTHS.len() - 1].draw);
+        assert!(
+            shortest.instructions_a_pixel() > longest.instructions_a_pixel(),
+            "{name}: a run of one pixel pays all of its set-up"
+        );
+        assert_eq!(row.cost(Work::FrameCard).ticks.len(), 1);
+        assert_eq!(row.accesses.loads, 0, "{name} reads video memory");
+    }
+}
+
+/// Counters in the way must not change what is drawn; and the counts are those that the orders are
+/// about.
+#[test]
+fn counting_changes_no_byte() {
+    let mut memories = Memories::default();
+    let mut emulated = Emulated::new(&mut memories);
+    for &(_, mapper, _) in Mapper::ALL {
+        let mut pixels = Vec::new();
+        for (name, order, _) in Order::ALL {
+            let [plain, counted] = emulated.checksums(mapper, order).unwrap();
+            assert_eq!(plain, counted, "{mapper} {name}");
+            // All but three works draw.
+            assert_eq!(plain.len(), Work::ALL.len() - 3, "{plain:?}");
+            let accesses = emulated.accesses(mapper, order).unwrap();
+            assert_eq!(accesses.flip.ports, 1, "{mapper} {name}");
+            if order == Order::Buffer {
+                assert_eq!(accesses.draw.map_mask, 4, "{mapper}");
+                assert_eq!(accesses.erase, modex::Tally::default(), "{mapper}");
+            } else {
+                pixels.push(accesses.draw.bytes);
+                assert_eq!(accesses.draw.bytes, accesses.draw.stores, "{mapper} {name}");
+                assert_eq!(accesses.erase.map_mask, 1, "{mapper} {name}");
+            }
+            if order == Order::Planes {
+                // Once more for each list of jobs that is full before the picture is drawn.
+                let lists = accesses.draw.map_mask / 4;
+                assert_eq!(accesses.draw.map_mask % 4, 0, "{mapper}");
+                assert!((1..=3).contains(&lists), "{mapper}: {lists} lists");
+            }
+        }
+        assert_eq!(
+            pixels[0], pixels[1],
+            "{mapper}: as many pixels in either order"
+        );
+    }
+}
+
+/// Everything, as a table: `cargo test --release --test measure -- --ignored --nocapture`.
+#[test]
+#[ignore = "measures for minutes; run it alone"]
+fn figures() {
+    let measured = measure::run(&Config::default()).unwrap();
+    println!("{}", table(&measured));
+}
+
+/// Instructions a pixel and ratios of times, a line for each mapper and order.
+fn table(measured: &Measured) -> String {
+    let mut table = format!("QEMU {}\n", measured.qemu);
+    for cpu in &measured.cpus {
+        let bmi2 = if cpu.bmi2 { "with" } else { "without" };
+        let reference = &cpu.rows[0];
+        let a_pixel = |work| reference.cost(work).instructions_a_pixel();
+        writeln!(
+            table,
+            "\n-cpu {}, {bmi2} BMI2; bare stores {:.2} instructions a pixel in RAM, {:.2} on the card; \
+             presenting {:.2}\n{:28} {:>7} {:>7} {:>7} {:>7} {:>7}  {:>6} {:>7} {:>6}  frame over bare stores / over presenting",
+            cpu.cpu,
+            a_pixel(Work::BareRam),
+            a_pixel(Work::BareCard),
+            a_pixel(Work::Present),
+            "instructions a pixel",
+            "jobs",
+            "loop",
+            "faces",
+            "jobs",
+            "frame",
+            "ports",
+            "stores",
+            "erase"
+        )
+        .unwrap();
+        for row in &cpu.rows {
+            let a_pixel = |work| row.cost(work).instructions_a_pixel();
+            let accesses = &row.accesses;
+            writeln!(
+                table,
+                "{:28} {:7.2} {:7.2} {:7.2} {:7.2} {:7.2}  {:6} {:7} {:6}  {} / {}",
+                format!("{} {}", row.mapper, row.order),
+                a_pixel(Work::ScreenJobs),
+                a_pixel(Work::ScreenRam),
+                a_pixel(Work::FrameFaces),
+                a_pixel(Work::FrameJobs),
+                a_pixel(row.whole_frame()),
+                accesses.draw.ports + accesses.erase.ports + accesses.flip.ports,
+                accesses.draw.stores,
+                accesses.erase.stores,
+                row.frame_over_bare(),
+                row.frame_over_present(),
+            )
+            .unwrap();
+        }
+    }
+    table
+}
