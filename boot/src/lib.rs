@@ -14,3 +14,4 @@ pub mod measure;
 pub mod report;
 pub mod screen;
 pub mod setup;
+pub mod trade;

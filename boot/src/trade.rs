@@ -1,0 +1,5 @@
+//! What accuracy costs: every mapper's error and time on every scene, as tables, plots and pages.
+
+pub mod accuracy;
+pub mod stats;
+pub mod subject;

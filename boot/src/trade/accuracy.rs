@@ -1,0 +1,183 @@
+//! How far a mapper's coordinates are from the truth, and its picture from the exact mapper's.
+//!
+//! The truth at a pixel is the quotient of the plane's integers at its centre, brought into the
+//! texture. The error is the larger of |u' - u| and |v' - v|, in texels, where (u', v') is where
+//! the mapper is: 16.16, so an exact mapper's is off by less than 2^-16.
+
+use modex::{HEIGHT, PlanarBuffer, WIDTH};
+use texmap::plane::{Plane, texel};
+use texmap::{JobList, Mapper, Order, Renderer, Texture};
+
+use super::stats::{Errors, psnr};
+use super::subject::{Owned, Subject};
+
+/// Jobs of a whole picture.
+pub type Jobs = JobList<{ scene::MAX_JOBS }>;
+
+/// A mapper's accuracy on a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Accuracy {
+    /// The texel errors of all pixels.
+    pub errors: Errors,
+    /// Pixels that show another texel than the exact mapper's.
+    pub other_texels: u64,
+    /// Peak signal to noise, decibels, each picture whole against the exact mapper's: the worst.
+    pub psnr: f64,
+}
+
+impl Accuracy {
+    /// The share of pixels with another texel than the exact mapper's, 0 to 1.
+    pub fn other_share(&self) -> f64 {
+        self.other_texels as f64 / self.errors.count().max(1) as f64
+    }
+
+    /// Takes another scene's in.
+    pub fn extend(&mut self, other: &Self) {
+        self.errors.extend(&other.errors);
+        self.other_texels += other.other_texels;
+        self.psnr = self.psnr.min(other.psnr);
+    }
+}
+
+/// The truth at a pixel.
+#[derive(Clone, Copy, Debug)]
+struct Truth {
+    /// The coordinates, in texels, from 0 to the texture's sides.
+    at: (f64, f64),
+    /// The exact mapper's texel.
+    texel: (u16, u16),
+}
+
+impl Truth {
+    fn new(plane: &Plane, texture: &Texture<'_>, x: u16, y: u16) -> Self {
+        let [a, b, c] = [plane.a, plane.b, plane.c].map(|form| form.at(x, y));
+        let coordinate = |n: i64, size: u16| {
+            let size_c = i64::from(size).checked_mul(c);
+            match n {
+                ..0 => 0.0,
+                // As everywhere: the border, and what lies on the horizon and behind it.
+                _ if size_c.is_none_or(|most| n >= most) => f64::from(size),
+                _ => n as f64 / c as f64,
+            }
+        };
+        let (width, height) = (texture.width(), texture.height());
+        Self {
+            at: (coordinate(a, width), coordinate(b, height)),
+            texel: (texel(a, c, width), texel(b, c, height)),
+        }
+    }
+}
+
+/// Calls `sink` with each pixel of a face, its error in texels, and whether its texel is another
+/// than the exact mapper's.
+pub fn errors(
+    mapper: Mapper,
+    face: &Owned,
+    texture: &Texture<'_>,
+    mut sink: impl FnMut((u16, u16), f64, bool),
+) {
+    let face = face.face();
+    let plane = face.plane();
+    let dropped = mapper.jobs(&face, texture, |job| {
+        job.pixels(texture, |(x, y), (u, v)| {
+            let truth = Truth::new(&plane, texture, x, y);
+            let off = |at: i32, truth: f64| (f64::from(at) / 65_536.0 - truth).abs();
+            let error = off(u, truth.at.0).max(off(v, truth.at.1));
+            let other = ((u >> 16) as u16, (v >> 16) as u16) != truth.texel;
+            sink((x, y), error, other);
+        });
+    });
+    dropped.expect("a scene's faces are legal");
+}
+
+/// A picture of a subject, drawn by a mapper.
+pub fn picture(subject: &Subject<'_>, number: usize, mapper: Mapper, jobs: &mut Jobs) -> Vec<u8> {
+    let mut page = Box::new(PlanarBuffer::new());
+    page.clear(&subject.background);
+    let order = Order::default();
+    let mut renderer = Renderer::new(jobs, &subject.textures, &mut *page, mapper, order);
+    for face in &subject.pictures[number] {
+        renderer.face(&face.face());
+    }
+    renderer.finish();
+    let pixels = (0..WIDTH * HEIGHT).map(|i| page.pixel(i % WIDTH, i / WIDTH));
+    pixels.collect()
+}
+
+/// A mapper on all pictures of a subject.
+pub fn measure(subject: &Subject<'_>, mapper: Mapper, jobs: &mut Jobs) -> Accuracy {
+    let mut accuracy = Accuracy {
+        psnr: f64::INFINITY,
+        ..Accuracy::default()
+    };
+    for (number, faces) in subject.pictures.iter().enumerate() {
+        for face in faces {
+            let texture = subject.texture(face.face().texture);
+            errors(mapper, face, texture, |_, error, other| {
+                accuracy.errors.add(error);
+                accuracy.other_texels += u64::from(other);
+            });
+        }
+        let [drawn, exact] = [mapper, Mapper::Exact].map(|mapper| {
+            let pixels = picture(subject, number, mapper, jobs);
+            let colours = pixels.iter().map(|&i| subject.palette[usize::from(i)]);
+            colours.collect::<Vec<_>>()
+        });
+        accuracy.psnr = accuracy.psnr.min(psnr(&drawn, &exact));
+    }
+    accuracy
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trade::subject::{RANDOM, with};
+
+    #[test]
+    fn the_exact_mapper_is_exact() {
+        let mut jobs = Box::new(Jobs::new());
+        for name in ["ball", "grazing-4096", RANDOM] {
+            with(name, 3, |subject| {
+                let exact = measure(subject, Mapper::Exact, &mut jobs);
+                assert!(exact.errors.count() > 10_000, "{name}");
+                assert!(exact.errors.largest() < 1.0 / 65_535.0, "{name}");
+                assert_eq!(exact.other_texels, 0, "{name}");
+                assert_eq!(exact.psnr, f64::INFINITY, "{name}");
+            });
+        }
+    }
+
+    /// The bound of facts of perspective: the worst of an affine column whose depth ratio is r is
+    /// |du| (sqrt r - 1) / (sqrt r + 1). A floor that lies level has the same in every column.
+    #[test]
+    fn an_affine_column_errs_as_the_formula_says() {
+        let affine = Mapper::parse("affine").unwrap();
+        with("tilted", 0, |subject| {
+            for faces in &subject.pictures {
+                let face = &faces[0];
+                let texture = subject.texture(face.face().texture);
+                let mut worst: f64 = 0.0;
+                errors(affine, face, texture, |_, error, _| {
+                    worst = worst.max(error)
+                });
+                // The square's depths are 2.3 -+ 1 units at most: a ratio below 2.6; and a column
+                // crosses at most the diagonal's 256 texels in either coordinate.
+                let root = 2.6f64.sqrt();
+                let bound = 256.0 * (root - 1.0) / (root + 1.0);
+                assert!(worst > 4.0 && worst < bound, "{worst} of {bound}");
+            }
+        });
+    }
+
+    #[test]
+    fn an_affine_mapper_is_right_where_there_is_no_perspective() {
+        let affine = Mapper::parse("affine").unwrap();
+        let mut jobs = Box::new(Jobs::new());
+        with("facing", 0, |subject| {
+            let accuracy = measure(subject, affine, &mut jobs);
+            // Vertices are on a grid of 1/256 pixel, the truth is not.
+            assert!(accuracy.errors.largest() < 0.02, "{accuracy:?}");
+            assert!(accuracy.psnr > 25.0);
+        });
+    }
+}

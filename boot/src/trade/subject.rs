@@ -1,0 +1,250 @@
+//! What mappers are measured on: the scenes at some of their poses, and polygons at random.
+
+use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+use scene::{Corner, FOCAL_LENGTH, Face as MeshFace, Mesh, Pose, Scene, Stage, Storage, Vec3};
+use texmap::plane::Anchor;
+use texmap::{Face, Texture, Vertex};
+
+/// The name of the scene of polygons at random.
+pub const RANDOM: &str = "random";
+/// Polygons of the random scene.
+const POLYGONS: usize = 200;
+
+/// The ticks that are looked at: a twelfth of a turn from each other and an odd bit.
+pub const TICKS: [u32; 4] = [0, 61, 122, 183];
+
+/// A face with a polygon of its own.
+#[derive(Clone, Debug)]
+pub struct Owned {
+    polygon: Vec<Vertex>,
+    texture: u16,
+    anchors: [Anchor; 3],
+    focal_length: i32,
+}
+
+impl Owned {
+    fn new(face: &Face<'_>) -> Self {
+        Self {
+            polygon: face.polygon.to_vec(),
+            texture: face.texture,
+            anchors: face.anchors,
+            focal_length: face.focal_length,
+        }
+    }
+
+    /// A face from its parts.
+    pub fn from_parts(polygon: Vec<Vertex>, anchors: [Anchor; 3]) -> Self {
+        Self {
+            polygon,
+            texture: 0,
+            anchors,
+            focal_length: FOCAL_LENGTH,
+        }
+    }
+
+    /// As the mappers take it.
+    pub fn face(&self) -> Face<'_> {
+        Face {
+            polygon: &self.polygon,
+            texture: self.texture,
+            anchors: self.anchors,
+            focal_length: self.focal_length,
+        }
+    }
+}
+
+/// A scene to measure on.
+#[derive(Debug)]
+pub struct Subject<'a> {
+    /// Its name.
+    pub name: &'static str,
+    /// A line about it.
+    pub about: String,
+    /// The faces of each picture.
+    pub pictures: Vec<Vec<Owned>>,
+    /// The textures of the faces, lit.
+    pub textures: Vec<Texture<'a>>,
+    /// The DAC's colours, 8 bits a part.
+    pub palette: [[u8; 3]; 256],
+    /// The colour of each scan line where there is no solid.
+    pub background: [u8; modex::HEIGHT],
+}
+
+impl<'a> Subject<'a> {
+    fn new(name: &'static str, about: String, stage: &'a mut Stage<'_>, poses: &[Pose]) -> Self {
+        let mut pictures = Vec::new();
+        for pose in poses {
+            let mut faces = Vec::new();
+            stage.polygons(pose, |face| faces.extend(face.as_ref().map(Owned::new)));
+            pictures.push(faces);
+        }
+        let stage: &'a Stage<'_> = stage;
+        let numbers = pictures.iter().flatten().map(|face| face.texture);
+        let most = numbers.max().unwrap_or(0);
+        Self {
+            name,
+            about,
+            pictures,
+            textures: (0..=most).map(|number| stage.surface(number)).collect(),
+            palette: stage
+                .palette()
+                .map(|colour| colour.map(crate::indexed::widen)),
+            background: *stage.background(),
+        }
+    }
+
+    /// A texture by the number that a face or a job has.
+    pub fn texture(&self, number: u16) -> &Texture<'a> {
+        &self.textures[usize::from(number)]
+    }
+}
+
+/// The names of all subjects.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    CATALOGUE.iter().map(|entry| entry.name).chain([RANDOM])
+}
+
+/// Makes the subject of a name, and lends it. `seed` is the random scene's.
+///
+/// # Panics
+/// If there is no such scene.
+pub fn with<T>(name: &str, seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
+    if name == RANDOM {
+        return with_random(seed, look);
+    }
+    let entry = Entry::parse(name).expect("the scene was looked up before");
+    let poses = TICKS.map(|tick| entry.pose(tick));
+    with_poses(entry, &poses, look)
+}
+
+/// Makes a subject of a scene at some poses, and lends it.
+pub fn with_poses<T>(entry: &Entry, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
+    let mut texels = Box::new([0; MAX_TEXELS]);
+    let mut storage = Box::new(Storage::new());
+    let textures = [entry.paint(&mut texels)];
+    let mut stage = Stage::new(&mut storage, entry.scene(&textures));
+    let about = entry.about.to_string();
+    look(&Subject::new(entry.name, about, &mut stage, poses))
+}
+
+/// The colours and the texture of a scene, and a mesh of its own.
+fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
+    let mut texels = Box::new([0; MAX_TEXELS]);
+    let mut storage = Box::new(Storage::new());
+    let entry = Entry::parse("tilted").expect("it is in the catalogue");
+    let textures = [entry.paint(&mut texels)];
+    let (vertices, corners, faces) = random_mesh(seed);
+    let mesh = Mesh {
+        vertices: &vertices,
+        corners: &corners,
+        faces: &faces,
+    };
+    let scene = Scene {
+        name: RANDOM,
+        mesh,
+        ..entry.scene(&textures)
+    };
+    let pose = Pose {
+        yaw: 0,
+        pitch: 0,
+        roll: 0,
+        distance: 0,
+    };
+    let about = format!("{POLYGONS} parallelograms at random, seed {seed}");
+    let mut stage = Stage::new(&mut storage, scene);
+    look(&Subject::new(RANDOM, about, &mut stage, &[pose]))
+}
+
+/// Parallelograms before the eye that look at it, from near to far, with the texture over each.
+fn random_mesh(seed: u64) -> (Vec<Vec3>, Vec<Corner>, Vec<MeshFace>) {
+    let mut random = fastrand::Rng::with_seed(seed);
+    let (mut vertices, mut corners, mut faces) = (Vec::new(), Vec::new(), Vec::new());
+    while faces.len() < POLYGONS {
+        // From half a unit to 32, each distance that is twice as far as likely as the one before.
+        let distance = (random.f64() * 6.0 - 1.0).exp2();
+        let mut around = |size: f64| (random.f64() * 2.0 - 1.0) * size * distance;
+        let middle = [around(0.6), around(0.45), distance];
+        let [m, n] = [0; 2].map(|_| [around(0.5), around(0.5), around(0.9)]);
+        let corner = |a: f64, b: f64| {
+            [0, 1, 2].map(|k| ((middle[k] + a * m[k] + b * n[k]) * 65_536.0).round() as i32)
+        };
+        let places = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)];
+        let quad = places.map(|(a, b)| corner(a, b));
+        if quad.iter().any(|place| place[2] < 2048) {
+            continue;
+        }
+        let cross = [0, 1, 2].map(|k| {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            m[i] * n[j] - m[j] * n[i]
+        });
+        let facing: f64 = (0..3).map(|k| cross[k] * middle[k]).sum();
+        let length = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+        // Turned over when it looks away; the ones that are hardly seen are left out.
+        if facing.abs() < 0.02 * length * distance {
+            continue;
+        }
+        let order = if facing > 0.0 {
+            [0, 1, 2, 3]
+        } else {
+            [0, 3, 2, 1]
+        };
+        let first = corners.len() as u16;
+        let base = vertices.len() as u16;
+        vertices.extend(quad);
+        let side = (textures_side() as i32) << 16;
+        let uv = [(0, 0), (side, 0), (side, side), (0, side)];
+        corners.extend(order.map(|i| Corner {
+            vertex: base + i as u16,
+            u: uv[i].0,
+            v: uv[i].1,
+        }));
+        let sign = -facing.signum() / length;
+        faces.push(MeshFace {
+            first,
+            corners: 4,
+            texture: 0,
+            normal: cross.map(|c| (c * sign * 16_384.0) as i32),
+        });
+    }
+    (vertices, corners, faces)
+}
+
+/// The side of the catalogue's largest textures.
+const fn textures_side() -> usize {
+    MAX_TEXELS.isqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_subject_has_faces_and_repeats() {
+        for name in names() {
+            let faces = |subject: &Subject<'_>| {
+                assert_eq!(subject.name, name);
+                let faces = subject.pictures.iter().flatten();
+                faces.map(|face| face.polygon.clone()).collect::<Vec<_>>()
+            };
+            let once = with(name, 7, faces);
+            assert!(!once.is_empty(), "{name}");
+            assert_eq!(once, with(name, 7, faces), "{name}");
+        }
+    }
+
+    #[test]
+    fn random_polygons_look_at_the_viewer_and_depend_on_the_seed() {
+        let polygons = |seed| {
+            with(RANDOM, seed, |subject| {
+                let faces = &subject.pictures[0];
+                // Some are off the screen's middle; none is lost to its back.
+                assert!(faces.len() > POLYGONS * 9 / 10, "{}", faces.len());
+                faces
+                    .iter()
+                    .map(|face| face.polygon.clone())
+                    .collect::<Vec<_>>()
+            })
+        };
+        assert_ne!(polygons(1), polygons(2));
+    }
+}
