@@ -1,5 +1,7 @@
 //! What accuracy costs: every mapper's error and time on every scene, as tables, plots and pages.
 
 pub mod accuracy;
+pub mod clock;
+pub mod cost;
 pub mod stats;
 pub mod subject;

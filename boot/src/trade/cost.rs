@@ -1,0 +1,679 @@
+//! What mappers cost in RAM, on this CPU.
+//!
+//! Everything is drawn into a planar buffer. Times move by several per cent from run to run, and
+//! with what else the machine does, so they are told as ratios of what was measured in turns:
+//! every contestant draws in every round, the rounds forwards and backwards by turns, and each
+//! ratio is of two times of the same round. A round's time is that of the fastest of several
+//! drawings one after the other: what disturbs can only make it longer.
+
+use modex::{Destination, PlanarBuffer};
+use texmap::coverage::Axis;
+use texmap::loops::Loop;
+use texmap::plane::Anchor;
+use texmap::{Job, Mapper, Order, Renderer, Texture, Vertex, Walk};
+
+use super::accuracy::Jobs;
+use super::clock;
+use super::stats::Spread;
+use super::subject::{Owned, Subject};
+
+/// Rounds, of whose values the median is told.
+pub const ROUNDS: usize = 5;
+
+/// The orders that differ in RAM. [`Order::Buffer`] draws as [`Order::Planes`] does; presenting
+/// costs where there is a card.
+pub const ORDERS: [Order; 2] = [Order::Polygons, Order::Planes];
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum What {
+    /// Drawing alone: the jobs were made before.
+    Loops,
+    /// A whole picture: its jobs are made and drawn.
+    Picture,
+}
+
+/// How the bare loop goes over the pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Way {
+    /// Down the columns.
+    Columns,
+    /// Along the rows, pixel by pixel.
+    Rows,
+    /// Along the rows, in four passes.
+    Passes,
+}
+
+/// Who draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Who {
+    /// A load and a store a pixel, and nothing else.
+    Bare(Way),
+    Mapper(Mapper),
+    /// The portable twin of a mapper's loop.
+    Twin(Loop),
+}
+
+impl Who {
+    /// The bare loop that goes over the pixels as a mapper does.
+    fn bare(mapper: Mapper) -> Self {
+        use texmap::Rows;
+        Self::Bare(match mapper {
+            Mapper::Rows(Rows::Passes) => Way::Passes,
+            Mapper::Rows(_) => Way::Rows,
+            _ => Way::Columns,
+        })
+    }
+}
+
+type Key = (Who, Order, What);
+
+/// What drawing needs.
+struct Arena {
+    page: Box<PlanarBuffer>,
+    jobs: Box<Jobs>,
+}
+
+type Draw<'a> = Box<dyn Fn(&mut Arena) + 'a>;
+
+struct Contestant<'a> {
+    key: Key,
+    pixels: u64,
+    draw: Draw<'a>,
+}
+
+/// The loop that this CPU draws with instructions that not every CPU of its kind has, if that is
+/// the mapper's.
+pub fn beyond_baseline(mapper: Mapper) -> Option<Loop> {
+    match mapper {
+        Mapper::Affine(Loop::Extract) if Loop::Extract.is_tuned_here() => Some(Loop::Extract),
+        _ => None,
+    }
+}
+
+/// What drawing a pixel costs.
+#[derive(Clone, Copy, Debug)]
+pub struct Cost {
+    /// In [`clock::UNIT`]s.
+    pub time: Spread,
+    /// As a ratio to a bare load and store a pixel in the same order.
+    pub to_bare: Spread,
+    /// As a ratio to `packed` in the polygons' order, in what is measured.
+    pub to_packed: Spread,
+}
+
+/// The costs of one mapper.
+#[derive(Clone, Copy, Debug)]
+pub struct Costs {
+    /// The mapper.
+    pub mapper: Mapper,
+    /// In which order.
+    pub order: Order,
+    /// Drawing alone.
+    pub loops: Cost,
+    /// The whole picture.
+    pub picture: Cost,
+    /// Drawing alone, by the portable twin of a loop whose instructions not every CPU has.
+    pub twin: Option<Cost>,
+}
+
+/// How long it may take.
+#[derive(Clone, Copy, Debug)]
+pub struct Effort {
+    /// Of drawing for one value, in [`clock::UNIT`]s; at least two drawings.
+    pub slice: u64,
+}
+
+impl Effort {
+    /// For figures.
+    pub const FULL: Self = Self { slice: 12_000_000 };
+    /// To see that it works.
+    pub const QUICK: Self = Self { slice: 600_000 };
+}
+
+/// The pixels and the jobs of a mapper on faces.
+///
+/// # Panics
+/// If a face is not legal.
+fn jobs(mapper: Mapper, faces: &[Owned], subject: &Subject<'_>) -> (Vec<Job>, u64) {
+    let mut jobs = Vec::new();
+    for face in faces {
+        let face = face.face();
+        let texture = subject.texture(face.texture);
+        let made = mapper.jobs(&face, texture, |job| jobs.push(job));
+        made.expect("a scene's faces are legal");
+    }
+    let mut pixels = 0;
+    for job in &jobs {
+        job.pixels(subject.texture(job.texture), |_, _| pixels += 1);
+    }
+    (jobs, pixels)
+}
+
+/// Draws jobs as [`Renderer`] does.
+fn draw(
+    jobs: &[Job],
+    mapper: Mapper,
+    order: Order,
+    textures: &[Texture<'_>],
+    page: &mut PlanarBuffer,
+) {
+    let style = mapper.style();
+    match order {
+        Order::Polygons => {
+            for job in jobs {
+                job.draw(style, &textures[usize::from(job.texture)], page);
+            }
+        }
+        Order::Planes | Order::Buffer => {
+            for plane in 0..4 {
+                page.select(plane);
+                for job in jobs {
+                    let texture = &textures[usize::from(job.texture)];
+                    job.draw_in_plane(plane, style, texture, page);
+                }
+            }
+        }
+    }
+}
+
+/// Draws affine columns with the portable twin of a loop.
+fn draw_by_twin(
+    jobs: &[Job],
+    twin: Loop,
+    order: Order,
+    textures: &[Texture<'_>],
+    page: &mut PlanarBuffer,
+) {
+    let mut one = |job: &Job| {
+        let Walk::Affine(walk) = job.walk else {
+            unreachable!("the loops are affine");
+        };
+        let texture = &textures[usize::from(job.texture)];
+        page.column(job.x, job.y, job.len, |column| {
+            twin.portable(texture, walk, column);
+        });
+    };
+    match order {
+        Order::Polygons => jobs.iter().for_each(one),
+        Order::Planes | Order::Buffer => {
+            for plane in 0..4 {
+                jobs.iter()
+                    .filter(|job| job.x & 3 == plane)
+                    .for_each(&mut one);
+            }
+        }
+    }
+}
+
+/// Loads and stores for every pixel of some jobs.
+fn bare(jobs: &[Job], way: Way, order: Order, texels: &[u8; 256], page: &mut PlanarBuffer) {
+    // The compiler can't see that the index needs no bounds check, but for a byte.
+    let mut at = 0u8;
+    let mut load = || {
+        at = at.wrapping_add(1);
+        texels[usize::from(at)]
+    };
+    let mut part = |job: &Job, plane: u16, page: &mut PlanarBuffer| {
+        let first = plane.wrapping_sub(job.x) & 3;
+        if first < job.len {
+            let len = (job.len - first).div_ceil(4);
+            page.lane::<1>(job.x + first, job.y, len, |row| row.fill(&mut load));
+        }
+    };
+    match (order, way) {
+        (Order::Polygons, Way::Columns) => {
+            for job in jobs {
+                page.column(job.x, job.y, job.len, |column| column.fill(&mut load));
+            }
+        }
+        (Order::Planes | Order::Buffer, Way::Columns) => {
+            for plane in 0..4 {
+                for job in jobs.iter().filter(|job| job.x & 3 == plane) {
+                    page.lane(job.x, job.y, job.len, |column: modex::Column<'_>| {
+                        column.fill(&mut load);
+                    });
+                }
+            }
+        }
+        (Order::Polygons, Way::Rows) => {
+            for job in jobs {
+                page.row(job.x, job.y, job.len, &mut load);
+            }
+        }
+        (Order::Polygons, Way::Passes) => {
+            for job in jobs {
+                (0..4).for_each(|plane| part(job, plane, page));
+            }
+        }
+        (Order::Planes | Order::Buffer, Way::Rows | Way::Passes) => {
+            for plane in 0..4 {
+                jobs.iter().for_each(|job| part(job, plane, page));
+            }
+        }
+    }
+}
+
+/// Every contestant on some faces: the mappers, and the bare loops that they are compared with.
+fn contestants<'a>(
+    mappers: &[Mapper],
+    faces: &'a [Owned],
+    subject: &'a Subject<'_>,
+    what: &[What],
+) -> Vec<Contestant<'a>> {
+    let texels: &[u8; 256] = subject.textures[0].texels()[..256]
+        .try_into()
+        .expect("it was cut to 256");
+    let mut all = Vec::new();
+    let affine = Mapper::parse("affine").expect("it is one of all");
+    let by_rows = Mapper::parse("row-steps").expect("it is one of all");
+    for (way, mapper) in [
+        (Way::Columns, affine),
+        (Way::Rows, by_rows),
+        (Way::Passes, by_rows),
+    ] {
+        if way != Way::Columns && !mappers.iter().any(|&m| Who::bare(m) == Who::Bare(way)) {
+            continue;
+        }
+        for order in ORDERS {
+            let (jobs, pixels) = jobs(mapper, faces, subject);
+            let axis = if way == Way::Columns {
+                Axis::Down
+            } else {
+                Axis::Right
+            };
+            assert!(jobs.iter().all(|job| job.axis == axis));
+            all.push(Contestant {
+                key: (Who::Bare(way), order, What::Loops),
+                pixels,
+                draw: Box::new(move |arena| bare(&jobs, way, order, texels, &mut arena.page)),
+            });
+        }
+    }
+    for twin in mappers.iter().copied().filter_map(beyond_baseline) {
+        for order in ORDERS {
+            let (jobs, pixels) = jobs(affine, faces, subject);
+            all.push(Contestant {
+                key: (Who::Twin(twin), order, What::Loops),
+                pixels,
+                draw: Box::new(move |arena| {
+                    draw_by_twin(&jobs, twin, order, &subject.textures, &mut arena.page);
+                }),
+            });
+        }
+    }
+    for &mapper in mappers {
+        for order in ORDERS {
+            for &what in what {
+                let (jobs, pixels) = jobs(mapper, faces, subject);
+                let draw: Draw<'a> = match what {
+                    What::Loops => Box::new(move |arena| {
+                        draw(&jobs, mapper, order, &subject.textures, &mut arena.page);
+                    }),
+                    What::Picture => Box::new(move |arena| {
+                        let Arena { page, jobs } = arena;
+                        let textures = &subject.textures;
+                        let mut renderer =
+                            Renderer::new(&mut **jobs, textures, &mut **page, mapper, order);
+                        for face in faces {
+                            renderer.face(&face.face());
+                        }
+                        std::hint::black_box(renderer.finish());
+                    }),
+                };
+                all.push(Contestant {
+                    key: (Who::Mapper(mapper), order, what),
+                    pixels,
+                    draw,
+                });
+            }
+        }
+    }
+    all
+}
+
+/// The time a pixel of each contestant in each round.
+fn race(contestants: &[Contestant<'_>], effort: Effort) -> Vec<Vec<f64>> {
+    let mut arena = Arena {
+        page: Box::new(PlanarBuffer::new()),
+        jobs: Box::new(Jobs::new()),
+    };
+    let mut time = |contestant: &Contestant<'_>| {
+        let start = clock::now();
+        (contestant.draw)(&mut arena);
+        clock::now() - start
+    };
+    let mut times = vec![Vec::new(); contestants.len()];
+    let mut order: Vec<usize> = (0..contestants.len()).collect();
+    for _ in 0..ROUNDS {
+        for &i in &order {
+            let contestant = &contestants[i];
+            // The first is there to warm the caches.
+            let first = time(contestant).max(1);
+            let drawings = (effort.slice / first).clamp(2, 1000);
+            let fastest = (0..drawings).map(|_| time(contestant)).min();
+            let fastest = fastest.unwrap_or(first).max(1) as f64;
+            times[i].push(fastest / contestant.pixels.max(1) as f64);
+        }
+        order.reverse();
+    }
+    times
+}
+
+/// How many times as long one took as the other, round by round.
+fn ratio(times: &[f64], others: &[f64]) -> Spread {
+    let ratios: Vec<f64> = times.iter().zip(others).map(|(a, b)| a / b).collect();
+    Spread::of(&ratios)
+}
+
+/// Times of a race, by who it was.
+struct Times(Vec<(Key, Vec<f64>)>);
+
+impl Times {
+    fn of(&self, key: Key) -> Option<&[f64]> {
+        let found = self.0.iter().find(|(known, _)| *known == key);
+        found.map(|(_, times)| &times[..])
+    }
+
+    fn cost(&self, mapper: Mapper, order: Order, what: What) -> Cost {
+        let cost = self.cost_of((Who::Mapper(mapper), order, what), Who::bare(mapper));
+        cost.expect("it took part")
+    }
+
+    fn cost_of(&self, key: Key, bare: Who) -> Option<Cost> {
+        let (_, order, what) = key;
+        let times = self.of(key)?;
+        let to = |key| match self.of(key) {
+            Some(others) => ratio(times, others),
+            None => Spread::of(&[f64::NAN]),
+        };
+        let packed = Mapper::parse("packed").expect("it is one of all");
+        Some(Cost {
+            time: Spread::of(times),
+            to_bare: to((bare, order, What::Loops)),
+            to_packed: to((Who::Mapper(packed), Order::Polygons, what)),
+        })
+    }
+}
+
+/// What `mappers` cost on a picture of a subject. `packed` takes part in any case.
+pub fn measure(
+    subject: &Subject<'_>,
+    number: usize,
+    mappers: &[Mapper],
+    effort: Effort,
+) -> Vec<Costs> {
+    let mut all = mappers.to_vec();
+    let packed = Mapper::parse("packed").expect("it is one of all");
+    if !all.contains(&packed) {
+        all.push(packed);
+    }
+    let faces = &subject.pictures[number];
+    let contestants = contestants(&all, faces, subject, &[What::Loops, What::Picture]);
+    let raced = race(&contestants, effort);
+    let times = Times(contestants.iter().map(|c| c.key).zip(raced).collect());
+    let mut costs = Vec::new();
+    for &mapper in mappers {
+        for order in ORDERS {
+            costs.push(Costs {
+                mapper,
+                order,
+                loops: times.cost(mapper, order, What::Loops),
+                picture: times.cost(mapper, order, What::Picture),
+                twin: beyond_baseline(mapper).and_then(|twin| {
+                    let key = (Who::Twin(twin), order, What::Loops);
+                    times.cost_of(key, Who::bare(mapper))
+                }),
+            });
+        }
+    }
+    costs
+}
+
+/// The cost of drawing alone on runs of one length, with the texture at one angle.
+#[derive(Clone, Copy, Debug)]
+pub struct Swept {
+    /// Pixels of each run down a column.
+    pub length: u16,
+    /// The texture's angle on the screen in degrees.
+    pub angle: f64,
+    /// The mapper.
+    pub mapper: Mapper,
+    /// In which order.
+    pub order: Order,
+    /// Drawing alone.
+    pub cost: Cost,
+}
+
+/// Run lengths that are swept, at [`ANGLE`].
+pub const LENGTHS: [u16; 10] = [1, 2, 4, 8, 16, 32, 64, 120, 180, 240];
+/// Angles that are swept besides [`ANGLE`], with runs of [`LENGTH`].
+pub const ANGLES: [f64; 6] = [0.0, 15.0, 45.0, 60.0, 75.0, 90.0];
+/// The angle at which lengths are swept.
+pub const ANGLE: f64 = 30.0;
+/// The length with which angles are swept.
+pub const LENGTH: u16 = 240;
+/// Texels a pixel: the turned screen fits into the texture at any angle.
+const SCALE: f64 = 0.63;
+
+/// Strips over the whole screen, each `length` pixels high, in one facing plane whose texture is
+/// turned by `angle` degrees.
+fn strips(length: u16, angle: f64) -> Vec<Owned> {
+    let (sin, cos) = angle.to_radians().sin_cos();
+    let texel = |x: i32, y: i32| {
+        let (x, y) = (f64::from(x - 160) * SCALE, f64::from(y - 120) * SCALE);
+        [128.0 + cos * x - sin * y, 128.0 + sin * x + cos * y]
+            .map(|at| (at * 65_536.0).round() as i32)
+    };
+    let length = i32::from(length);
+    let strip = |k: i32| {
+        let (top, bottom) = (k * length, (k + 1) * length);
+        let places = [(0, top), (320, top), (320, bottom), (0, bottom)];
+        let polygon = places.map(|(x, y)| {
+            let [u, v] = texel(x, y);
+            Vertex {
+                x: x * texmap::SUBPIXELS,
+                y: y * texmap::SUBPIXELS,
+                u,
+                v,
+            }
+        });
+        // Two units away; where on the plane does not matter.
+        let far = 2 * 65_536;
+        let anchors = [(0, 0), (320, 0), (320, 240)].map(|(x, y)| {
+            let [u, v] = texel(x, y);
+            let out = |pixels: i32| pixels * far / scene::FOCAL_LENGTH;
+            Anchor {
+                position: [out(x - 160), out(y - 120), far],
+                u,
+                v,
+            }
+        });
+        Owned::from_parts(polygon.to_vec(), anchors)
+    };
+    (0..240 / length).map(strip).collect()
+}
+
+/// Sweeps run lengths and angles. `done` is told after each of [`SWEEPS`].
+pub fn sweep(
+    subject: &Subject<'_>,
+    mappers: &[Mapper],
+    effort: Effort,
+    mut done: impl FnMut(),
+) -> Vec<Swept> {
+    let mut all = mappers.to_vec();
+    let packed = Mapper::parse("packed").expect("it is one of all");
+    if !all.contains(&packed) {
+        all.push(packed);
+    }
+    let lengths = LENGTHS.iter().map(|&length| (length, ANGLE));
+    let angles = ANGLES.iter().map(|&angle| (LENGTH, angle));
+    let mut swept = Vec::new();
+    for (length, angle) in lengths.chain(angles) {
+        let faces = strips(length, angle);
+        let contestants = contestants(&all, &faces, subject, &[What::Loops]);
+        let raced = race(&contestants, effort);
+        let times = Times(contestants.iter().map(|c| c.key).zip(raced).collect());
+        for &mapper in mappers {
+            for order in ORDERS {
+                swept.push(Swept {
+                    length,
+                    angle,
+                    mapper,
+                    order,
+                    cost: times.cost(mapper, order, What::Loops),
+                });
+            }
+        }
+        done();
+    }
+    swept
+}
+
+/// What unrolling gains: the time of a plain loop as a ratio to that of the same loop unrolled
+/// eight times, on the longest strips, plane by plane.
+pub fn unrolling(subject: &Subject<'_>, effort: Effort) -> Spread {
+    let affine = Mapper::parse("affine").expect("it is one of all");
+    let faces = strips(LENGTH, ANGLE);
+    let texels: &[u8; 1 << 16] = subject.textures[0]
+        .texels()
+        .try_into()
+        .expect("the subject's texture is the largest");
+    let walk = |job: &Job| {
+        let Walk::Affine(walk) = job.walk else {
+            unreachable!("the mapper is affine");
+        };
+        let (mut u, mut v) = (walk.u as u32, walk.v as u32);
+        move || {
+            let texel = texels[usize::from(((v >> 8) & 0xFF00 | (u >> 16) & 0xFF) as u16)];
+            u = u.wrapping_add(walk.du as u32);
+            v = v.wrapping_add(walk.dv as u32);
+            texel
+        }
+    };
+    let contestant = |unrolled: bool| {
+        let (jobs, pixels) = jobs(affine, &faces, subject);
+        let columns = move |arena: &mut Arena| {
+            for plane in 0..4 {
+                for job in jobs.iter().filter(|job| job.x & 3 == plane) {
+                    let mut next = walk(job);
+                    arena
+                        .page
+                        .lane(job.x, job.y, job.len, |mut column: modex::Column<'_>| {
+                            while unrolled && column.len() >= 8 {
+                                let (eight, rest) = column.split(8);
+                                eight.fill(&mut next);
+                                column = rest;
+                            }
+                            column.fill(next);
+                        });
+                }
+            }
+        };
+        Contestant {
+            key: (Who::Bare(Way::Columns), Order::Planes, What::Loops),
+            pixels,
+            draw: Box::new(columns),
+        }
+    };
+    let times = race(&[contestant(false), contestant(true)], effort);
+    ratio(&times[0], &times[1])
+}
+
+/// Steps of [`sweep`].
+pub const SWEEPS: usize = LENGTHS.len() + ANGLES.len();
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trade::subject::with;
+
+    const TINY: Effort = Effort { slice: 1 };
+
+    fn some() -> Vec<Mapper> {
+        ["row-steps", "row-passes", "packed", "extract", "exact"]
+            .map(|name| Mapper::parse(name).unwrap())
+            .to_vec()
+    }
+
+    #[test]
+    fn costs_are_of_every_mapper_in_every_order() {
+        with("tilted", 0, |subject| {
+            let costs = measure(subject, 1, &some(), TINY);
+            assert_eq!(costs.len(), 2 * some().len());
+            for costs in &costs {
+                let twin = beyond_baseline(costs.mapper);
+                assert_eq!(costs.twin.is_some(), twin.is_some());
+                for cost in [costs.loops, costs.picture] {
+                    for spread in [cost.time, cost.to_bare, cost.to_packed] {
+                        assert!(spread.least > 0.0 && spread.most.is_finite(), "{costs:?}");
+                    }
+                }
+            }
+            let packed = costs
+                .iter()
+                .find(|costs| costs.mapper.to_string() == "packed");
+            let packed = packed.unwrap();
+            assert_eq!(packed.order, Order::Polygons);
+            assert_eq!(packed.loops.to_packed.median, 1.0);
+            assert_eq!(packed.loops.to_packed.percent(), 0.0);
+        });
+    }
+
+    /// What is timed draws what it is said to draw: the renderer's picture, and the bare loops as
+    /// many pixels.
+    #[test]
+    fn contestants_draw_whole_pictures() {
+        with("tilted", 0, |subject| {
+            let mappers = some();
+            let faces = &subject.pictures[1];
+            let all = contestants(&mappers, faces, subject, &[What::Loops, What::Picture]);
+            let twins = mappers
+                .iter()
+                .filter(|&&m| beyond_baseline(m).is_some())
+                .count();
+            assert_eq!(all.len(), 2 * (3 + twins + 2 * mappers.len()));
+            let drawn = |contestant: &Contestant<'_>| {
+                let mut arena = Arena {
+                    page: Box::new(PlanarBuffer::new()),
+                    jobs: Box::new(Jobs::new()),
+                };
+                // A colour that no lit texel has.
+                arena.page.planes = [[0; modex::PAGE_BYTES]; 4];
+                (contestant.draw)(&mut arena);
+                arena.page
+            };
+            let touched = |page: &PlanarBuffer| {
+                let bytes = page.planes.as_flattened();
+                bytes.iter().filter(|&&byte| byte != 0).count() as u64
+            };
+            for contestant in &all {
+                let page = drawn(contestant);
+                assert_eq!(touched(&page), contestant.pixels, "{:?}", contestant.key);
+                let mapper = match contestant.key.0 {
+                    Who::Bare(_) => continue,
+                    Who::Mapper(mapper) => mapper,
+                    Who::Twin(twin) => Mapper::Affine(twin),
+                };
+                let same = all.iter().find(|other| other.key.0 == Who::Mapper(mapper));
+                assert!(page == drawn(same.unwrap()), "{:?}", contestant.key);
+            }
+        });
+    }
+
+    #[test]
+    fn strips_cover_the_screen_and_stay_in_the_texture() {
+        with("tilted", 0, |subject| {
+            for (length, angle) in [(1, 45.0), (64, 10.0), (240, 90.0)] {
+                let faces = strips(length, angle);
+                for mapper in some() {
+                    let (jobs, pixels) = jobs(mapper, &faces, subject);
+                    assert_eq!(pixels, 320 * (240 / u64::from(length)) * u64::from(length));
+                    if jobs[0].axis == Axis::Down {
+                        assert!(jobs.iter().all(|job| job.len == length));
+                    }
+                }
+            }
+        });
+    }
+}
