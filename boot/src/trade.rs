@@ -3,5 +3,9 @@
 pub mod accuracy;
 pub mod clock;
 pub mod cost;
+pub mod page;
+pub mod plot;
+pub mod seeds;
 pub mod stats;
 pub mod subject;
+pub mod table;

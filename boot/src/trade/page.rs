@@ -1,0 +1,334 @@
+//! The page: plots, pictures with maps of their errors, and the tables. It needs no network.
+
+use std::fmt::Write as _;
+
+use modex::{HEIGHT, WIDTH};
+use texmap::Mapper;
+
+use super::accuracy::{self, Accuracy, Jobs};
+use super::subject::Subject;
+use super::table::{decibels, percent, texels};
+use crate::indexed::Indexed;
+use crate::screen::Screen;
+
+const STYLE: &str = concat!(include_str!("../report.css"), include_str!("page.css"));
+
+/// The errors that the maps' colours tell apart, as powers of two of a texel.
+const HEAT: (f64, f64) = (-8.0, 5.0);
+/// The maps' colours, evenly over [`HEAT`]; page.css has them, too, for the legend.
+const COLOURS: [[u8; 3]; 6] = [
+    [0x10, 0x10, 0x2A],
+    [0x2B, 0x3F, 0x9E],
+    [0x7C, 0x3C, 0xB8],
+    [0xD9, 0x3F, 0x74],
+    [0xFB, 0x9A, 0x3C],
+    [0xFF, 0xF5, 0xB0],
+];
+/// Where there is no solid.
+const NOTHING: [u8; 3] = [0x4C, 0x4C, 0x4C];
+
+/// A picture and the map of its errors, which one or several mappers have alike.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// The mappers' names.
+    pub mappers: Vec<String>,
+    /// What they draw.
+    pub picture: Indexed,
+    /// How far off its texels are.
+    pub heat: Screen,
+    /// Their accuracy on the picture.
+    pub accuracy: Accuracy,
+}
+
+/// The pictures of a scene.
+#[derive(Clone, Debug)]
+pub struct Gallery {
+    /// The scene's name.
+    pub scene: String,
+    /// A line about it.
+    pub about: String,
+    /// The pictures that differ.
+    pub shown: Vec<Shown>,
+}
+
+impl Gallery {
+    /// The first picture of a subject by all mappers.
+    pub fn new(subject: &Subject<'_>, mappers: &[Mapper], jobs: &mut Jobs) -> Self {
+        let mut shown: Vec<Shown> = Vec::new();
+        let colours = |pixels: &[u8]| {
+            let colours = pixels.iter().map(|&i| subject.palette[usize::from(i)]);
+            colours.collect::<Vec<_>>()
+        };
+        let exact = colours(&accuracy::picture(subject, 0, Mapper::Exact, jobs));
+        for &mapper in mappers {
+            let pixels = accuracy::picture(subject, 0, mapper, jobs);
+            let mut accuracy = Accuracy {
+                psnr: super::stats::psnr(&colours(&pixels), &exact),
+                ..Accuracy::default()
+            };
+            let mut heat = vec![NOTHING; WIDTH * HEIGHT];
+            for face in &subject.pictures[0] {
+                let texture = subject.texture(face.face().texture);
+                accuracy::errors(mapper, face, texture, |(x, y), error, other| {
+                    heat[usize::from(y) * WIDTH + usize::from(x)] = colour(error);
+                    accuracy.errors.add(error);
+                    accuracy.other_texels += u64::from(other);
+                });
+            }
+            let alike =
+                |s: &&mut Shown| s.picture.pixels == pixels && s.accuracy.errors == accuracy.errors;
+            if let Some(same) = shown.iter_mut().find(alike) {
+                same.mappers.push(mapper.to_string());
+                continue;
+            }
+            shown.push(Shown {
+                mappers: vec![mapper.to_string()],
+                picture: Indexed {
+                    width: WIDTH,
+                    height: HEIGHT,
+                    palette: subject.palette.map(|c| c.map(|part| part >> 2)).to_vec(),
+                    pixels,
+                },
+                heat: Screen {
+                    width: WIDTH,
+                    height: HEIGHT,
+                    pixels: heat,
+                },
+                accuracy,
+            });
+        }
+        Self {
+            scene: subject.name.into(),
+            about: subject.about.clone(),
+            shown,
+        }
+    }
+
+    /// The file of a picture, or of its map.
+    pub fn file(&self, shown: &Shown, map: bool) -> String {
+        let of = if map { "-error" } else { "" };
+        // A name may have a slash.
+        let mapper = shown.mappers[0].replace(|c: char| !c.is_ascii_alphanumeric(), "-");
+        format!("{}-{mapper}{of}.png", self.scene)
+    }
+
+    fn section(&self, page: &mut String, folder: &str) {
+        let (scene, about) = (escape(&self.scene), escape(&self.about));
+        let _ = write!(
+            page,
+            "<section class=\"card\">\n<h2>The scene <code>{scene}</code></h2>\n<p>{about}. \
+             Mappers that are alike in every pixel share a picture.</p>\n<div class=\"gallery\">\n"
+        );
+        for shown in &self.shown {
+            let names = shown.mappers.iter().map(|name| escape(name));
+            let names = names.collect::<Vec<_>>().join(", ");
+            let errors = &shown.accuracy.errors;
+            let _ = writeln!(
+                page,
+                "<figure><figcaption><b>{names}</b><span>largest {} texels, mean {}; other texels \
+                 {}; PSNR {}</span></figcaption>\n\
+                 <img src=\"{folder}/{}\" alt=\"{scene} by {names}\" width=\"320\" height=\"240\">\
+                 <img src=\"{folder}/{}\" alt=\"its errors\" width=\"320\" height=\"240\"></figure>",
+                texels(errors.largest()),
+                texels(errors.mean()),
+                percent(shown.accuracy.other_share()).replace('<', "&lt;"),
+                decibels(shown.accuracy.psnr),
+                self.file(shown, false),
+                self.file(shown, true),
+            );
+        }
+        *page += "</div>\n</section>\n";
+    }
+}
+
+/// The colour of an error in texels.
+fn colour(error: f64) -> [u8; 3] {
+    let (from, to) = HEAT;
+    let steps = (COLOURS.len() - 1) as f64;
+    let at = ((error.log2() - from) / (to - from)).clamp(0.0, 1.0) * steps;
+    let i = (at as usize).min(COLOURS.len() - 2);
+    let part = at - i as f64;
+    std::array::from_fn(|k| {
+        let (a, b) = (f64::from(COLOURS[i][k]), f64::from(COLOURS[i + 1][k]));
+        (a + (b - a) * part).round() as u8
+    })
+}
+
+/// What the page is made of.
+#[derive(Debug)]
+pub struct Page<'a> {
+    /// What was run, and on what: a line each.
+    pub about: &'a [String],
+    /// Plots, as SVG, each with a caption.
+    pub plots: &'a [(String, String)],
+    /// Pictures.
+    pub galleries: &'a [Gallery],
+    /// The folder of the pictures, beside the page.
+    pub folder: &'a str,
+    /// Tables: a title, a line about it, and the cells. The first is shown open.
+    pub tables: &'a [(String, String, Vec<Vec<String>>)],
+    /// The seeds on trial.
+    pub trials: &'a [Vec<String>],
+}
+
+impl Page<'_> {
+    /// The page as HTML.
+    pub fn html(&self) -> String {
+        let mut page = format!(
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n\
+             <title>What accuracy costs - Crystal Ball</title>\n<style>\n{STYLE}</style>\n</head>\n\
+             <body class=\"trade\">\n<header class=\"top\">\n\
+             <p class=\"brand\">Crystal Ball <span>trade</span></p>\n\
+             <h1>What accuracy costs</h1>\n"
+        );
+        for line in self.about {
+            let _ = writeln!(page, "<p>{}</p>", escape(line));
+        }
+        page += "</header>\n<main>\n";
+        for (caption, svg) in self.plots {
+            let _ = write!(
+                page,
+                "<section class=\"card plot\">\n{svg}\n<p>{}</p>\n</section>\n",
+                escape(caption)
+            );
+        }
+        if let Some((title, about, cells)) = self.tables.first() {
+            let _ = write!(
+                page,
+                "<section class=\"card\">\n<h2>{}</h2>\n<p>{}</p>\n",
+                escape(title),
+                escape(about)
+            );
+            table(&mut page, cells);
+            page += "</section>\n";
+        }
+        if self.tables.len() > 1 {
+            page += "<section class=\"card\">\n<h2>Scene by scene</h2>\n";
+            for (title, about, cells) in &self.tables[1..] {
+                let _ = writeln!(
+                    page,
+                    "<details><summary><b>{}</b> {}</summary>",
+                    escape(title),
+                    escape(about)
+                );
+                table(&mut page, cells);
+                page += "</details>\n";
+            }
+            page += "</section>\n";
+        }
+        page += LEGEND;
+        for gallery in self.galleries {
+            gallery.section(&mut page, self.folder);
+        }
+        page += "<section class=\"card trials\">\n<h2>The seeds on trial</h2>\n<p>What the book's \
+                 chapters 57 and 58 and the articles on perspective claim, of the machines of their \
+                 day, and what it comes to here.</p>\n";
+        table(&mut page, self.trials);
+        page += "</section>\n</main>\n</body>\n</html>\n";
+        page
+    }
+}
+
+const LEGEND: &str = "<aside class=\"heat\"><span>Maps of the error, in texels:</span>\
+                      <i></i><ol><li>1/256</li><li>1/32</li><li>1/4</li><li>2</li><li>8</li><li>32</li></ol>\
+                      <span>grey: no solid</span></aside>\n";
+
+/// A table; the first line is its head.
+fn table(page: &mut String, cells: &[Vec<String>]) {
+    *page += "<div class=\"wide\"><table>\n";
+    for (i, line) in cells.iter().enumerate() {
+        let (open, close) = match i {
+            0 => ("<thead><tr>", "</tr></thead>\n<tbody>\n"),
+            _ => ("<tr>", "</tr>\n"),
+        };
+        *page += open;
+        for cell in line {
+            let tag = if i == 0 { "th" } else { "td" };
+            let _ = write!(page, "<{tag}>{}</{tag}>", code(&escape(cell)));
+        }
+        *page += close;
+    }
+    *page += "</tbody>\n</table></div>\n";
+}
+
+/// What stands between backticks as code.
+fn code(text: &str) -> String {
+    let mut out = String::new();
+    for (i, part) in text.split('`').enumerate() {
+        match i % 2 {
+            0 => out += part,
+            _ => {
+                let _ = write!(out, "<code>{part}</code>");
+            }
+        }
+    }
+    out
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trade::subject::with;
+
+    #[test]
+    fn colours_go_from_small_to_large_errors_and_the_legend_has_them() {
+        assert_eq!(colour(0.0), COLOURS[0]);
+        assert_eq!(colour(1.0 / 256.0), COLOURS[0]);
+        assert_eq!(colour(32.0), COLOURS[5]);
+        assert_eq!(colour(1e9), COLOURS[5]);
+        let step = (HEAT.1 - HEAT.0) / 5.0;
+        assert_eq!(colour((HEAT.0 + 2.0 * step).exp2()), COLOURS[2]);
+        for [red, green, blue] in COLOURS {
+            let hex = format!("#{red:02x}{green:02x}{blue:02x}");
+            assert!(STYLE.contains(&hex), "{hex}");
+        }
+    }
+
+    #[test]
+    fn the_page_names_every_file_and_fetches_nothing() {
+        let mappers = ["affine", "packed", "exact"].map(|name| Mapper::parse(name).unwrap());
+        let mut jobs = Box::new(Jobs::new());
+        let gallery = with("tilted", 0, |subject| {
+            Gallery::new(subject, &mappers, &mut jobs)
+        });
+        let names = gallery.shown.iter().map(|shown| shown.mappers.len());
+        assert_eq!(names.sum::<usize>(), 3);
+        let exact = gallery
+            .shown
+            .iter()
+            .find(|s| s.mappers[0] == "exact")
+            .unwrap();
+        assert_eq!(exact.accuracy.psnr, f64::INFINITY);
+        assert!(exact.heat.pixels.contains(&COLOURS[0]) && exact.heat.pixels.contains(&NOTHING));
+        let html = Page {
+            about: &["a <b>".into()],
+            plots: &[("caption".into(), "<svg></svg>".into())],
+            galleries: std::slice::from_ref(&gallery),
+            folder: "pictures",
+            tables: &[(
+                "t".into(),
+                "about".into(),
+                vec![vec!["h".into()], vec!["`c` < d".into()]],
+            )],
+            trials: &[vec!["head".into()]],
+        }
+        .html();
+        for shown in &gallery.shown {
+            for map in [false, true] {
+                let name = format!("\"pictures/{}\"", gallery.file(shown, map));
+                assert!(html.contains(&name), "{name}");
+            }
+        }
+        assert!(html.contains("a &lt;b&gt;") && html.contains("<code>c</code> &lt; d"));
+        assert!(!html.contains("://") && !html.contains("@import") && !html.contains("<script"));
+    }
+}

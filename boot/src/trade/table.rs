@@ -1,0 +1,465 @@
+//! The figures as tables, for people (Markdown) and for programs (CSV).
+
+use std::fmt::Write as _;
+
+use texmap::{Mapper, Order};
+
+use super::accuracy::Accuracy;
+use super::clock;
+use super::cost::{Cost, Costs, Swept};
+use super::stats::Spread;
+
+/// What was counted and timed in the kernel under QEMU, of a mapper on a scene in one order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KernelFigures {
+    /// The scene's name.
+    pub scene: String,
+    /// The mapper's name.
+    pub mapper: String,
+    /// The order.
+    pub order: Order,
+    /// Instructions a pixel, counted.
+    pub instructions: f64,
+    /// Port writes for a picture, counted.
+    pub port_writes: u64,
+    /// Stores to video memory for a picture, counted.
+    pub stores: u64,
+    /// QEMU's time as a ratio to `packed` in the polygons' order.
+    pub time: f64,
+}
+
+/// A mapper's figures on a scene, or on all of them.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The mapper.
+    pub mapper: Mapper,
+    /// Its accuracy.
+    pub accuracy: Accuracy,
+    /// Its cost in each of [`ORDERS`](super::cost::ORDERS).
+    pub costs: Vec<Costs>,
+    /// What the kernel said, if it was asked.
+    pub kernel: Vec<KernelFigures>,
+}
+
+impl Row {
+    /// The name of the mapper.
+    pub fn name(&self) -> String {
+        self.mapper.to_string()
+    }
+
+    /// The order in which whole pictures are drawn fastest, and its costs.
+    ///
+    /// # Panics
+    /// If the row has no costs.
+    pub fn best(&self) -> &Costs {
+        let cost = |costs: &&Costs| costs.picture.time.median;
+        let best = self.costs.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
+        best.expect("there is an order")
+    }
+
+    /// The costs in an order.
+    ///
+    /// # Panics
+    /// If the order was not measured.
+    pub fn costs(&self, order: Order) -> &Costs {
+        let found = self.costs.iter().find(|costs| costs.order == order);
+        found.expect("every order was measured")
+    }
+}
+
+/// All mappers on a scene.
+#[derive(Clone, Debug)]
+pub struct Table {
+    /// The scene's name.
+    pub scene: String,
+    /// A line about it.
+    pub about: String,
+    /// A row a mapper.
+    pub rows: Vec<Row>,
+}
+
+impl Table {
+    /// The tables of several scenes as one: errors together, costs as geometric means.
+    pub fn all(tables: &[Self]) -> Self {
+        let mut rows = Vec::new();
+        let mappers = tables.first().map_or(&[][..], |table| &table.rows);
+        for (i, first) in mappers.iter().enumerate() {
+            let same: Vec<&Row> = tables.iter().map(|table| &table.rows[i]).collect();
+            let mut accuracy = first.accuracy.clone();
+            same[1..]
+                .iter()
+                .for_each(|row| accuracy.extend(&row.accuracy));
+            let mean = |k: usize, part: fn(&Costs) -> Cost| {
+                let parts = |spread: fn(&Cost) -> Spread| {
+                    let all: Vec<Spread> = same
+                        .iter()
+                        .map(|row| spread(&part(&row.costs[k])))
+                        .collect();
+                    Spread::mean(&all)
+                };
+                Cost {
+                    time: parts(|cost| cost.time),
+                    to_bare: parts(|cost| cost.to_bare),
+                    to_packed: parts(|cost| cost.to_packed),
+                }
+            };
+            let costs = first.costs.iter().enumerate().map(|(k, costs)| Costs {
+                loops: mean(k, |costs| costs.loops),
+                picture: mean(k, |costs| costs.picture),
+                twin: costs
+                    .twin
+                    .map(|_| mean(k, |costs| costs.twin.unwrap_or(costs.loops))),
+                ..*costs
+            });
+            rows.push(Row {
+                mapper: first.mapper,
+                accuracy,
+                costs: costs.collect(),
+                kernel: Vec::new(),
+            });
+        }
+        let names: Vec<_> = tables.iter().map(|table| &table.scene[..]).collect();
+        Self {
+            scene: "all scenes".into(),
+            about: format!(
+                "{}: errors together, costs as geometric means",
+                names.join(", ")
+            ),
+            rows,
+        }
+    }
+
+    /// The table's head and its rows, cell by cell.
+    pub fn cells(&self) -> Vec<Vec<String>> {
+        let mut head: Vec<String> = ["mapper", "largest", "99 %", "mean", "other texels", "PSNR"]
+            .map(String::from)
+            .to_vec();
+        head.extend([
+            "loops, polygons".into(),
+            "loops, planes".into(),
+            "picture, polygons".into(),
+            "picture, planes".into(),
+            "picture to packed".into(),
+        ]);
+        let kernel = self.rows.iter().any(|row| !row.kernel.is_empty());
+        if kernel {
+            head.extend(
+                [
+                    "in QEMU: order",
+                    "instructions",
+                    "port writes",
+                    "stores",
+                    "time to packed",
+                ]
+                .map(String::from),
+            );
+        }
+        let mut cells = vec![head];
+        for row in &self.rows {
+            let accuracy = &row.accuracy;
+            let mut line = vec![
+                row.name(),
+                texels(accuracy.errors.largest()),
+                texels(accuracy.errors.percentile(0.99)),
+                texels(accuracy.errors.mean()),
+                percent(accuracy.other_share()),
+                decibels(accuracy.psnr),
+            ];
+            let parts: [fn(&Costs) -> Cost; 2] = [|costs| costs.loops, |costs| costs.picture];
+            for part in parts {
+                line.extend(row.costs.iter().map(|costs| {
+                    let Cost { time, to_bare, .. } = part(costs);
+                    format!(
+                        "{:.2} ± {:.2} ({:.2})",
+                        time.median,
+                        time.half(),
+                        to_bare.median
+                    )
+                }));
+            }
+            line.push(format!("{:.2}", row.best().picture.to_packed.median));
+            let twins = row.costs.iter().enumerate();
+            for (k, twin) in twins.filter_map(|(k, costs)| Some((k, costs.twin?))) {
+                // After the accuracy's columns, those of the loops.
+                line[6 + k] += &format!("; {:.2} without BMI2", twin.time.median);
+            }
+            if kernel {
+                let best = row.kernel.iter().min_by(|a, b| a.time.total_cmp(&b.time));
+                line.extend(match best {
+                    None => vec![String::new(); 5],
+                    Some(figures) => vec![
+                        figures.order.to_string(),
+                        format!("{:.2}", figures.instructions),
+                        figures.port_writes.to_string(),
+                        figures.stores.to_string(),
+                        format!("{:.2}", figures.time),
+                    ],
+                });
+            }
+            cells.push(line);
+        }
+        cells
+    }
+}
+
+/// Lines of cells as a Markdown table, the first column to the left and the rest to the right.
+pub fn markdown(cells: &[Vec<String>]) -> String {
+    let mut text = String::new();
+    for (i, line) in cells.iter().enumerate() {
+        let line: Vec<_> = line.iter().map(|cell| cell.replace('|', "\\|")).collect();
+        let _ = writeln!(text, "| {} |", line.join(" | "));
+        if i == 0 {
+            let rules = line.iter().enumerate();
+            let rules: Vec<_> = rules
+                .map(|(k, _)| if k == 0 { "---" } else { "---:" })
+                .collect();
+            let _ = writeln!(text, "| {} |", rules.join(" | "));
+        }
+    }
+    text
+}
+
+/// Texels with as many digits as mean something.
+pub fn texels(error: f64) -> String {
+    match error {
+        0.0 => "0".into(),
+        100.0.. => format!("{error:.0}"),
+        10.0.. => format!("{error:.1}"),
+        1.0.. => format!("{error:.2}"),
+        0.1.. => format!("{error:.3}"),
+        0.01.. => format!("{error:.4}"),
+        0.0001.. => format!("{error:.5}"),
+        // The last bit of a coordinate.
+        _ => format!("{error:.6}"),
+    }
+}
+
+/// A share in per cent.
+pub fn percent(share: f64) -> String {
+    match 100.0 * share {
+        0.0 => "0".into(),
+        percent if percent < 0.01 => "< 0.01 %".into(),
+        percent if percent < 10.0 => format!("{percent:.2} %"),
+        percent => format!("{percent:.1} %"),
+    }
+}
+
+/// Decibels; equal pictures have no noise.
+pub fn decibels(psnr: f64) -> String {
+    match psnr.is_finite() {
+        true => format!("{psnr:.1} dB"),
+        false => "equal".into(),
+    }
+}
+
+/// All figures: a line a scene, mapper and order.
+pub fn csv(tables: &[Table]) -> String {
+    let mut text =
+        String::from("scene,mapper,order,unit,pixels,largest_error,p99_error,mean_error");
+    text += ",other_texels,psnr_db";
+    for what in ["loops", "picture"] {
+        for part in ["time", "time_to_bare", "time_to_packed"] {
+            for of in ["", "_least", "_most"] {
+                let _ = write!(text, ",{what}_{part}{of}");
+            }
+        }
+    }
+    text += ",loops_time_without_bmi2";
+    text += ",kernel_instructions,kernel_port_writes,kernel_stores,kernel_time_to_packed\n";
+    for table in tables {
+        for row in &table.rows {
+            let accuracy = &row.accuracy;
+            for costs in &row.costs {
+                let _ = write!(
+                    text,
+                    "{},{},{},{},{},{},{},{},{},{}",
+                    field(&table.scene),
+                    field(&row.name()),
+                    costs.order,
+                    clock::UNIT,
+                    accuracy.errors.count(),
+                    accuracy.errors.largest(),
+                    accuracy.errors.percentile(0.99),
+                    accuracy.errors.mean(),
+                    accuracy.other_texels,
+                    accuracy.psnr,
+                );
+                for cost in [costs.loops, costs.picture] {
+                    for spread in [cost.time, cost.to_bare, cost.to_packed] {
+                        let Spread {
+                            median,
+                            least,
+                            most,
+                        } = spread;
+                        let _ = write!(text, ",{median:.4},{least:.4},{most:.4}");
+                    }
+                }
+                text.push(',');
+                if let Some(twin) = costs.twin {
+                    let _ = write!(text, "{:.4}", twin.time.median);
+                }
+                match row.kernel.iter().find(|k| k.order == costs.order) {
+                    None => text += ",,,,",
+                    Some(k) => {
+                        let (ports, stores) = (k.port_writes, k.stores);
+                        let _ = write!(text, ",{},{ports},{stores},{}", k.instructions, k.time);
+                    }
+                }
+                text.push('\n');
+            }
+        }
+    }
+    text
+}
+
+/// The sweeps over run lengths and angles.
+pub fn sweep_csv(swept: &[Swept]) -> String {
+    let mut text = String::from("length,angle,mapper,order,unit,time,time_least,time_most");
+    text += ",time_to_bare,time_to_packed\n";
+    for at in swept {
+        let Spread {
+            median,
+            least,
+            most,
+        } = at.cost.time;
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{median:.4},{least:.4},{most:.4},{:.4},{:.4}",
+            at.length,
+            at.angle,
+            field(&at.mapper.to_string()),
+            at.order,
+            clock::UNIT,
+            at.cost.to_bare.median,
+            at.cost.to_packed.median
+        );
+    }
+    text
+}
+
+/// A field of a CSV file, quoted where it has to be.
+fn field(text: &str) -> String {
+    match text.contains(['"', ',', '\n', '\r']) {
+        true => format!("\"{}\"", text.replace('"', "\"\"")),
+        false => text.into(),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A table with figures of no meaning.
+    pub fn made_up(scene: &str, scale: f64) -> Table {
+        let mut rows = Vec::new();
+        for (i, &(_, mapper, _)) in Mapper::ALL.iter().enumerate() {
+            let mut accuracy = Accuracy {
+                psnr: 30.0 + i as f64,
+                ..Accuracy::default()
+            };
+            let mut errors = fastrand::Rng::with_seed(i as u64);
+            for _ in 0..100 {
+                accuracy
+                    .errors
+                    .add(errors.f64() * scale * 0.7f64.powi(i as i32));
+            }
+            let cost = |time: f64| Cost {
+                time: Spread::of(&[time, time * 1.1, time * 0.95]),
+                to_bare: Spread::of(&[time / 2.0]),
+                to_packed: Spread::of(&[time / 3.0]),
+            };
+            let costs = super::super::cost::ORDERS.map(|order| Costs {
+                mapper,
+                order,
+                loops: cost(1.0 + i as f64),
+                picture: cost(2.0 + i as f64 * scale),
+                twin: (i % 2 == 0).then(|| cost(7.0)),
+            });
+            rows.push(Row {
+                mapper,
+                accuracy,
+                costs: costs.to_vec(),
+                kernel: Vec::new(),
+            });
+        }
+        Table {
+            scene: scene.into(),
+            about: "made up".into(),
+            rows,
+        }
+    }
+
+    #[test]
+    fn csv_has_as_many_fields_in_every_line() {
+        let mut tables = vec![made_up("a", 1.0), made_up("b,\"c\"", 2.0)];
+        let row = &mut tables[0].rows[0];
+        row.kernel.push(KernelFigures {
+            scene: "a".into(),
+            mapper: row.mapper.to_string(),
+            order: Order::Planes,
+            instructions: 4.5,
+            port_writes: 7,
+            stores: 9,
+            time: 0.5,
+        });
+        let text = csv(&tables);
+        let mut lines = text.lines();
+        let fields = |line: &str| line.replace("\"b,\"\"c\"\"\"", "b").split(',').count();
+        let head = lines.next().unwrap();
+        assert_eq!(fields(head), 10 + 18 + 1 + 4);
+        let mut count = 0;
+        for line in lines {
+            assert_eq!(fields(line), fields(head), "{line}");
+            count += 1;
+        }
+        assert_eq!(count, 2 * Mapper::ALL.len() * 2);
+        assert!(text.lines().nth(2).unwrap().ends_with(",4.5,7,9,0.5"));
+        assert!(text.ends_with('\n') && !text.contains("\n\n"));
+    }
+
+    #[test]
+    fn markdown_has_as_many_cells_in_every_line() {
+        let table = made_up("a", 1.0);
+        let text = markdown(&table.cells());
+        let bars = |line: &str| line.matches('|').count();
+        let head = text.lines().next().unwrap();
+        assert_eq!(bars(head), 12);
+        assert!(text.lines().all(|line| bars(line) == 12));
+        assert_eq!(text.lines().count(), 2 + Mapper::ALL.len());
+    }
+
+    #[test]
+    fn tables_together_have_all_errors_and_mean_costs() {
+        let tables = [made_up("a", 1.0), made_up("b", 4.0)];
+        let all = Table::all(&tables);
+        for (i, row) in all.rows.iter().enumerate() {
+            let of = |k: usize| &tables[k].rows[i];
+            assert_eq!(row.accuracy.errors.count(), 200);
+            assert_eq!(
+                row.accuracy.errors.largest(),
+                of(1).accuracy.errors.largest()
+            );
+            let product = of(0).costs[0].picture.time.median * of(1).costs[0].picture.time.median;
+            let mean = row.costs[0].picture.time.median;
+            assert!((mean * mean / product - 1.0).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn figures_have_the_digits_that_mean_something() {
+        for (error, text) in [
+            (0.0, "0"),
+            (123.4, "123"),
+            (12.34, "12.3"),
+            (1.234, "1.23"),
+            (0.1234, "0.123"),
+            (0.00123, "0.00123"),
+            (0.000_015, "0.000015"),
+        ] {
+            assert_eq!(texels(error), text);
+        }
+        assert_eq!(percent(0.1234), "12.3 %");
+        assert_eq!(percent(0.00001), "< 0.01 %");
+        assert_eq!(decibels(f64::INFINITY), "equal");
+    }
+}
