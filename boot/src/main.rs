@@ -16,7 +16,7 @@ use crystal_ball::golden;
 use crystal_ball::look::Look;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::setup::{self, Options, Ready, say};
-use crystal_ball::{aside, child};
+use crystal_ball::{aside, child, trade};
 use show::Memory;
 
 /// How long the ball turns before its picture is taken without a display.
@@ -54,6 +54,7 @@ Examples (`cargo run -- ` hands on what follows):
   cargo run -- doctor                  what is set up, and where
   cargo run -- diff A B                what differs in two dumps, PNGs or folders
   cargo run -- image --out ball.img    the disk image, for another emulator
+  cargo run --release -- trade         what accuracy costs: tables, plots, pictures
 
 Exit codes: 0 done; 1 set-up failed; 2 wrong usage; 10 panic; 11 CPU exception; 12 triple fault;
 13 hang; 14 stopped in the boot loader; 15 QEMU failed; 16 serial line garbled; 130 ended by you.";
@@ -107,6 +108,9 @@ enum Subcommands {
         /// The golden frames' folder [default: tests/golden of the workspace]
         folder: Option<PathBuf>,
     },
+    /// Measure what accuracy costs: every mapper's error and time on every scene, as tables,
+    /// plots and a page; in a release build
+    Trade(trade::Options),
     /// Write the bootable disk image
     Image {
         /// The file to write
@@ -211,6 +215,22 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
                     folder.display()
                 )),
             }
+        }
+        Some(Subcommands::Trade(mut options)) => {
+            if let Err(error) = trade::check_build() {
+                say(format_args!("error: {error}"));
+                return Ok(ExitCode::from(2));
+            }
+            let Look { scene, mapper, .. } = cli.look;
+            options
+                .scenes
+                .extend(scene.map(|scene| scene.0.name.into()));
+            options
+                .mappers
+                .extend(mapper.map(|mapper| mapper.0.name().into()));
+            let page = trade::run(&options, &[])?;
+            say("what was found, as a page with the tables and plots beside it:");
+            tell_path(&page)?;
         }
         Some(Subcommands::Image { out }) => write_image(&setup::image(&options)?, &out)?,
         None => {

@@ -1,4 +1,30 @@
 //! What accuracy costs: every mapper's error and time on every scene, as tables, plots and pages.
+//!
+//! [`run`] measures, and writes what it found into a folder:
+//!
+//! | file | what |
+//! | --- | --- |
+//! | `trade.html` | all of it, with pictures and maps of their errors |
+//! | `trade.md`, `trade.csv` | the table, for people and for programs |
+//! | `sweep.csv` | cost by run length and texture angle |
+//! | `error-cost.svg` | error against cost, a point a mapper, over all scenes |
+//! | `error-cost-one.svg` | the same on the tilted square alone |
+//! | `error-column.svg` | the error along one long column |
+//! | `cost-length.svg` | cost against run length |
+//! | `pictures/` | the pages' pictures |
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use clap::builder::PossibleValuesParser;
+use texmap::loops::Loop;
+use texmap::{Mapper, Order};
+
+use crate::aside;
+use crate::setup::Step;
 
 pub mod accuracy;
 pub mod clock;
@@ -9,3 +35,464 @@ pub mod seeds;
 pub mod stats;
 pub mod subject;
 pub mod table;
+
+use accuracy::Jobs;
+use cost::{Effort, ROUNDS, SWEEPS, Swept};
+use page::{Gallery, Page};
+use plot::{Line, Point};
+use table::{KernelFigures, Row, Table};
+
+/// The random scene's seed, unless another is asked for: the same polygons every time.
+const SEED: u64 = 57;
+/// The picture of a scene that is timed.
+const TIMED: usize = 1;
+/// The scene whose pictures come first, and whose columns are looked into.
+const SHOWN: [&str; 3] = ["tilted", "grazing-16", "cube"];
+/// The scene of the plot of errors along a column.
+const COLUMN: &str = "tilted";
+/// The plot of error against cost on that scene.
+const ONE_SCENE: &str = "error-cost-one.svg";
+/// The mappers of that plot, and of the one of cost against run length.
+const ALONG: [&str; 6] = [
+    "affine",
+    "linear-32",
+    "linear-16",
+    "linear-8",
+    "quadratic-32",
+    "quadratic",
+];
+const BY_LENGTH: [&str; 8] = [
+    "row-steps",
+    "packed",
+    "two-steps",
+    "shifts",
+    "extract",
+    "linear-16",
+    "quadratic-16",
+    "exact",
+];
+
+/// What to measure, and where to put it.
+#[derive(Clone, Debug, clap::Args)]
+pub struct Options {
+    /// The folder for what is found [default: target/crystal-ball/trade of the workspace]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Only these scenes, with commas between them; `--scene` names one
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(subject::names()))]
+    pub scenes: Vec<String>,
+    /// Only these mappers, with commas between them; `--mapper` names one
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(mapper_names()))]
+    pub mappers: Vec<String>,
+    /// Times of a tenth of the length: to look at, not to rely on
+    #[arg(long)]
+    quick: bool,
+    /// The seed of the random polygons
+    #[arg(long, value_name = "NUMBER", default_value_t = SEED)]
+    seed: u64,
+}
+
+fn mapper_names() -> impl Iterator<Item = &'static str> {
+    Mapper::ALL.iter().map(|named| named.0)
+}
+
+/// Why a build can't measure.
+///
+/// # Errors
+/// In a build with debug assertions: what it would measure is the checks.
+pub fn check_build() -> anyhow::Result<()> {
+    ensure!(
+        !cfg!(debug_assertions),
+        "a debug build measures its own checks: use `cargo run --release -- trade`"
+    );
+    Ok(())
+}
+
+/// Measures and writes; returns the page's path. `kernel` are the kernel's own figures, of those
+/// scenes, mappers and orders that it was asked for.
+///
+/// # Errors
+/// When a file can't be written.
+pub fn run(options: &Options, kernel: &[KernelFigures]) -> anyhow::Result<PathBuf> {
+    let out = match &options.out {
+        Some(out) => out.clone(),
+        None => crate::setup::folder().join("trade"),
+    };
+    let chosen = |all: &[String], name: &str| all.is_empty() || all.iter().any(|one| one == name);
+    let named = Mapper::ALL.iter();
+    let mappers: Vec<Mapper> = named
+        .filter(|named| chosen(&options.mappers, named.0))
+        .map(|named| named.1)
+        .collect();
+    let scenes: Vec<_> = subject::names()
+        .filter(|name| chosen(&options.scenes, name))
+        .collect();
+    let effort = match options.quick {
+        true => Effort::QUICK,
+        false => Effort::FULL,
+    };
+    fs::create_dir_all(out.join("pictures"))
+        .with_context(|| format!("{} cannot be made", out.display()))?;
+    let found = measure(&scenes, &mappers, options.seed, effort, kernel);
+    let about = about(options, &mappers);
+    found.write(&out, &about)?;
+    Ok(out.join("trade.html"))
+}
+
+/// What was run, and on what.
+fn about(options: &Options, mappers: &[Mapper]) -> Vec<String> {
+    let unit = clock::UNIT;
+    let mut about = vec![
+        format!("On {}.", clock::cpu()),
+        format!(
+            "Errors in texels, against the exact quotient at the pixel's centre. Costs in {unit} \
+             a pixel, median of {ROUNDS} rounds ± half their spread, drawn into RAM; in brackets \
+             as a ratio to a bare load and store a pixel in the same order. \"To packed\": to \
+             `packed` by polygons."
+        ),
+    ];
+    if options.quick {
+        about.push("A quick run: its times are to look at, not to rely on.".into());
+    }
+    let extract = Mapper::Affine(Loop::Extract);
+    if mappers.contains(&extract) {
+        about.push(match cost::beyond_baseline(extract) {
+            Some(_) => "`extract` needs BMI2: \"without\" is its portable twin.".into(),
+            None => "This CPU has no BMI2: `extract` is its portable twin.".into(),
+        });
+    }
+    about
+}
+
+/// All that was measured.
+#[derive(Debug)]
+struct Found {
+    /// A table a scene.
+    tables: Vec<Table>,
+    galleries: Vec<Gallery>,
+    swept: Vec<Swept>,
+    unrolling: stats::Spread,
+    tilts: Option<Vec<(f64, accuracy::Accuracy)>>,
+    column: Option<(u16, Vec<Line>)>,
+}
+
+fn measure(
+    scenes: &[&str],
+    mappers: &[Mapper],
+    seed: u64,
+    effort: Effort,
+    kernel: &[KernelFigures],
+) -> Found {
+    let mut jobs = Box::new(Jobs::new());
+    let mut tables = Vec::new();
+    let mut galleries = Vec::new();
+    let mut column = None;
+    let mut step = Step::counting("measuring scenes", scenes.len() as u64);
+    for (done, name) in (1..).zip(scenes) {
+        subject::with(name, seed, |subject| {
+            let number = TIMED.min(subject.pictures.len() - 1);
+            let mut costs = cost::measure(subject, number, mappers, effort).into_iter();
+            let rows = mappers.iter().map(|&mapper| Row {
+                mapper,
+                accuracy: accuracy::measure(subject, mapper, &mut jobs),
+                costs: costs.by_ref().take(cost::ORDERS.len()).collect(),
+                kernel: of(kernel, subject.name, mapper),
+            });
+            let rows = rows.collect();
+            if SHOWN.contains(name) || scenes.len() == 1 {
+                galleries.push(Gallery::new(subject, mappers, &mut jobs));
+            }
+            if *name == COLUMN {
+                column = along_column(subject);
+            }
+            tables.push(Table {
+                scene: subject.name.into(),
+                about: subject.about.clone(),
+                rows,
+            });
+        });
+        step.at(done);
+    }
+    drop(step);
+    let mut step = Step::counting("sweeping run lengths and angles", SWEEPS as u64);
+    let mut done = 0;
+    let (swept, unrolling) = subject::with("tilted", seed, |subject| {
+        let swept = cost::sweep(subject, mappers, effort, || {
+            done += 1;
+            step.at(done);
+        });
+        (swept, cost::unrolling(subject, effort))
+    });
+    drop(step);
+    Found {
+        tables,
+        galleries,
+        swept,
+        unrolling,
+        tilts: seeds::tilts(),
+        column,
+    }
+}
+
+/// Those of the kernel's figures that are of a mapper on a scene.
+fn of(kernel: &[KernelFigures], scene: &str, mapper: Mapper) -> Vec<KernelFigures> {
+    let name = mapper.to_string();
+    let same = kernel
+        .iter()
+        .filter(|k| k.scene == scene && k.mapper == name);
+    same.cloned().collect()
+}
+
+/// The errors down the longest column of a subject's first picture.
+fn along_column(subject: &subject::Subject<'_>) -> Option<(u16, Vec<Line>)> {
+    let faces = &subject.pictures[0];
+    let mut pixels = BTreeMap::new();
+    let errors = |mapper, sink: &mut dyn FnMut((u16, u16), f64)| {
+        for face in faces {
+            let texture = subject.texture(face.face().texture);
+            accuracy::errors(mapper, face, texture, |place, error, _| sink(place, error));
+        }
+    };
+    errors(Mapper::Exact, &mut |(x, _), _| {
+        *pixels.entry(x).or_insert(0) += 1;
+    });
+    let (&column, _) = pixels.iter().max_by_key(|&(_, count)| *count)?;
+    let lines = ALONG.iter().filter_map(|name| {
+        let mut at = BTreeMap::new();
+        errors(Mapper::parse(name)?, &mut |(x, y), error| {
+            if x == column {
+                at.insert(y, error);
+            }
+        });
+        let at = at.into_iter().map(|(y, error)| (f64::from(y), error));
+        Some(Line {
+            name: (*name).into(),
+            at: at.collect(),
+        })
+    });
+    let lines = lines.collect();
+    Some((column, lines))
+}
+
+impl Found {
+    /// Writes all files; the page last, so that what it names is there.
+    fn write(&self, out: &Path, about: &[String]) -> anyhow::Result<()> {
+        let put = |name: &str, text: &str| {
+            aside::write(&out.join(name), |file| Ok(file.write_all(text.as_bytes())?))
+        };
+        let all = Table::all(&self.tables);
+        let several = self.tables.len() > 1;
+        let mut tables: Vec<&Table> = Vec::new();
+        tables.extend(several.then_some(&all));
+        tables.extend(&self.tables);
+        let plots = self.plots(tables[0])?;
+        for (name, _, svg) in &plots {
+            put(name, svg)?;
+        }
+        let trials = seeds::trials(
+            &self.tables,
+            &self.swept,
+            self.unrolling,
+            self.tilts.as_deref(),
+        );
+        let trials = seeds::cells(&trials);
+
+        let mut text = String::from("# What accuracy costs\n\n");
+        for line in about {
+            text += &format!("{line}\n\n");
+        }
+        for table in &tables {
+            text += &format!("## {}\n\n{}.\n\n", table.scene, table.about);
+            text += &table::markdown(&table.cells());
+            text.push('\n');
+        }
+        text += "## The seeds on trial\n\n";
+        text += &table::markdown(&trials).replace("---:", "---");
+        put("trade.md", &text)?;
+        put("trade.csv", &table::csv(&self.tables))?;
+        put("sweep.csv", &table::sweep_csv(&self.swept))?;
+
+        let folder = "pictures";
+        for gallery in &self.galleries {
+            for shown in &gallery.shown {
+                let path = |map| out.join(folder).join(gallery.file(shown, map));
+                aside::write(&path(false), |file| shown.picture.write_png(file))?;
+                aside::write(&path(true), |file| shown.heat.write_png(file))?;
+            }
+        }
+        let plots: Vec<_> = plots
+            .into_iter()
+            .map(|(_, caption, svg)| (caption, svg))
+            .collect();
+        let cells: Vec<_> = tables
+            .iter()
+            .map(|table| {
+                let about = format!("{}.", table.about);
+                (table.scene.clone(), about, table.cells())
+            })
+            .collect();
+        let page = Page {
+            about,
+            plots: &plots,
+            galleries: &self.galleries,
+            folder,
+            tables: &cells,
+            trials: &trials,
+        };
+        put("trade.html", &page.html())
+    }
+
+    /// The plots: file, caption, drawing.
+    fn plots(&self, table: &Table) -> anyhow::Result<Vec<(&'static str, String, String)>> {
+        let unit = clock::UNIT;
+        let mut plots = Vec::new();
+        // All scenes together, and one that is neither the easiest nor the hardest.
+        let shown = self.tables.iter().find(|shown| shown.scene == COLUMN);
+        let shown = shown.filter(|shown| shown.scene != table.scene);
+        for (file, table) in [("error-cost.svg", Some(table)), (ONE_SCENE, shown)] {
+            let Some(table) = table else { continue };
+            let points = table.rows.iter().map(|row| Point {
+                mapper: row.mapper,
+                cost: row.best().picture.time.median,
+                error: row.accuracy.errors.percentile(0.99),
+                by_planes: row.best().order == Order::Planes,
+            });
+            let points: Vec<_> = points.collect();
+            let svg = plot::error_against_cost(
+                [
+                    &format!("Error against cost: {}", table.scene),
+                    "whole pictures in RAM, in the cheaper of both orders",
+                ],
+                [
+                    &format!("{unit} a pixel"),
+                    "error of the 99th percentile, texels",
+                ],
+                &points,
+            )?;
+            let caption = "99 of 100 pixels err by less than the height says. The exact mapper is \
+                           off by the last bit of a 16.16 coordinate, which is how coordinates are \
+                           told; its texels are exact.";
+            plots.push((file, caption.into(), svg));
+        }
+        if let Some((column, lines)) = &self.column {
+            plots.push((
+                "error-column.svg",
+                "Each mapper touches the truth where it divides, and strays between. Below 1/65536 \
+                 texel coordinates are not told apart."
+                    .into(),
+                plot::lines(
+                    [
+                        "The error along one column",
+                        &format!("column {column}, the longest of the scene {COLUMN} at tick 0"),
+                    ],
+                    ["row of the screen", "error, texels"],
+                    1.0 / 65_536.0,
+                    false,
+                    lines,
+                )?,
+            ));
+        }
+        let by_length = BY_LENGTH.iter().filter_map(|name| {
+            let mapper = Mapper::parse(name)?;
+            let of = |swept: &&Swept| {
+                swept.mapper == mapper && swept.order == Order::Planes && swept.angle == cost::ANGLE
+            };
+            let mut at: Vec<_> = self
+                .swept
+                .iter()
+                .filter(of)
+                .map(|swept| (f64::from(swept.length), swept.cost.time.median))
+                .collect();
+            at.sort_by(|a, b| a.0.total_cmp(&b.0));
+            (!at.is_empty()).then(|| Line {
+                name: (*name).into(),
+                at,
+            })
+        });
+        let by_length: Vec<_> = by_length.collect();
+        if !by_length.is_empty() {
+            plots.push((
+                "cost-length.svg",
+                "What a column costs before its first pixel shows in short runs. Rows are as wide \
+                 as the screen whatever the column's height."
+                    .into(),
+                plot::lines(
+                    [
+                        "Cost against run length",
+                        &format!(
+                            "drawing alone, plane by plane, the texture at {} degrees",
+                            cost::ANGLE
+                        ),
+                    ],
+                    ["pixels in a column's run", &format!("{unit} a pixel")],
+                    0.01,
+                    true,
+                    &by_length,
+                )?,
+            ));
+        }
+        Ok(plots)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_debug_build_refuses() {
+        assert_eq!(check_build().is_err(), cfg!(debug_assertions));
+    }
+
+    /// All of it at once, as small as can be.
+    #[test]
+    fn everything_is_written() {
+        let out = tempfile::tempdir().unwrap();
+        let mappers = ["affine", "packed", "linear-16", "exact"];
+        let mappers = mappers.map(|name| Mapper::parse(name).unwrap());
+        let effort = Effort { slice: 1 };
+        let kernel = [KernelFigures {
+            scene: "tilted".into(),
+            mapper: "packed".into(),
+            order: Order::Planes,
+            instructions: 6.25,
+            port_writes: 4,
+            stores: 39_824,
+            time: 0.75,
+        }];
+        fs::create_dir(out.path().join("pictures")).unwrap();
+        let found = measure(&["tilted", "wall"], &mappers, 1, effort, &kernel);
+        found.write(out.path(), &["about".into()]).unwrap();
+        let read = |name: &str| fs::read_to_string(out.path().join(name)).unwrap();
+        let csv = read("trade.csv");
+        assert_eq!(csv.lines().count(), 1 + 2 * 4 * 2);
+        let kernel = csv
+            .lines()
+            .filter(|line| line.ends_with(",6.25,4,39824,0.75"));
+        assert_eq!(kernel.count(), 1);
+        assert_eq!(read("sweep.csv").lines().count(), 1 + SWEEPS * 4 * 2);
+        let md = read("trade.md");
+        for part in [
+            "## all scenes",
+            "## tilted",
+            "## wall",
+            "## The seeds on trial",
+            "6.25",
+        ] {
+            assert!(md.contains(part), "{part}");
+        }
+        let html = read("trade.html");
+        for name in ["error-cost.svg", "error-column.svg", "cost-length.svg"] {
+            let svg = read(name);
+            assert!(html.contains(svg.trim()), "{name}");
+        }
+        // Every picture that is named is there.
+        let named = html.split('"').filter(|part| part.starts_with("pictures/"));
+        let mut count = 0;
+        for name in named {
+            assert!(out.path().join(name).is_file(), "{name}");
+            count += 1;
+        }
+        assert!(count >= 4 && count % 2 == 0);
+    }
+}
