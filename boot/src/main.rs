@@ -216,19 +216,19 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
                 )),
             }
         }
-        Some(Subcommands::Trade(mut options)) => {
+        Some(Subcommands::Trade(mut trade_options)) => {
             if let Err(error) = trade::check_build() {
                 say(format_args!("error: {error}"));
                 return Ok(ExitCode::from(2));
             }
             let Look { scene, mapper, .. } = cli.look;
-            options
+            trade_options
                 .scenes
                 .extend(scene.map(|scene| scene.0.name.into()));
-            options
+            trade_options
                 .mappers
-                .extend(mapper.map(|mapper| mapper.0.name().into()));
-            let page = trade::run(&options, &[])?;
+                .extend(mapper.map(|mapper| mapper.to_string()));
+            let page = trade::run(&trade_options, options)?;
             say("what was found, as a page with the tables and plots beside it:");
             tell_path(&page)?;
         }

@@ -6,6 +6,7 @@
 //! | --- | --- |
 //! | `trade.html` | all of it, with pictures and maps of their errors |
 //! | `trade.md`, `trade.csv` | the table, for people and for programs |
+//! | `kernel.csv` | what the kernel takes under QEMU |
 //! | `sweep.csv` | cost by run length and texture angle |
 //! | `error-cost.svg` | error against cost, a point a mapper, over all scenes |
 //! | `error-cost-one.svg` | the same on the tilted square alone |
@@ -24,11 +25,13 @@ use texmap::loops::Loop;
 use texmap::{Mapper, Order};
 
 use crate::aside;
-use crate::setup::Step;
+use crate::measure::{self, Measured};
+use crate::setup::{self, Step};
 
 pub mod accuracy;
 pub mod clock;
 pub mod cost;
+pub mod kernel;
 pub mod page;
 pub mod plot;
 pub mod seeds;
@@ -40,7 +43,7 @@ use accuracy::Jobs;
 use cost::{Effort, ROUNDS, SWEEPS, Swept};
 use page::{Gallery, Page};
 use plot::{Line, Point};
-use table::{KernelFigures, Row, Table};
+use table::{Row, Table};
 
 /// The random scene's seed, unless another is asked for: the same polygons every time.
 const SEED: u64 = 57;
@@ -87,6 +90,9 @@ pub struct Options {
     /// Times of a tenth of the length: to look at, not to rely on
     #[arg(long)]
     quick: bool,
+    /// Leave out what the kernel takes under QEMU
+    #[arg(long)]
+    host_only: bool,
     /// The seed of the random polygons
     #[arg(long, value_name = "NUMBER", default_value_t = SEED)]
     seed: u64,
@@ -108,12 +114,11 @@ pub fn check_build() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Measures and writes; returns the page's path. `kernel` are the kernel's own figures, of those
-/// scenes, mappers and orders that it was asked for.
+/// Measures and writes; returns the page's path.
 ///
 /// # Errors
-/// When a file can't be written.
-pub fn run(options: &Options, kernel: &[KernelFigures]) -> anyhow::Result<PathBuf> {
+/// When the measuring kernel can't be asked, or a file can't be written.
+pub fn run(options: &Options, setup: setup::Options) -> anyhow::Result<PathBuf> {
     let out = match &options.out {
         Some(out) => out.clone(),
         None => crate::setup::folder().join("trade"),
@@ -133,7 +138,21 @@ pub fn run(options: &Options, kernel: &[KernelFigures]) -> anyhow::Result<PathBu
     };
     fs::create_dir_all(out.join("pictures"))
         .with_context(|| format!("{} cannot be made", out.display()))?;
-    let found = measure(&scenes, &mappers, options.seed, effort, kernel);
+    // The kernel first: what is missing for it is told at once.
+    let measured = match options.host_only {
+        true => None,
+        false => Some(measure::run(&measure::Config {
+            options: setup,
+            mappers: mappers.clone(),
+            rounds: if options.quick { 1 } else { 5 },
+            runs: false,
+            ..measure::Config::default()
+        })?),
+    };
+    let found = Found {
+        kernel: measured,
+        ..measure(&scenes, &mappers, options.seed, effort)
+    };
     let about = about(options, &mappers);
     found.write(&out, &about)?;
     Ok(out.join("trade.html"))
@@ -174,15 +193,10 @@ struct Found {
     unrolling: stats::Spread,
     tilts: Option<Vec<(f64, accuracy::Accuracy)>>,
     column: Option<(u16, Vec<Line>)>,
+    kernel: Option<Measured>,
 }
 
-fn measure(
-    scenes: &[&str],
-    mappers: &[Mapper],
-    seed: u64,
-    effort: Effort,
-    kernel: &[KernelFigures],
-) -> Found {
+fn measure(scenes: &[&str], mappers: &[Mapper], seed: u64, effort: Effort) -> Found {
     let mut jobs = Box::new(Jobs::new());
     let mut tables = Vec::new();
     let mut galleries = Vec::new();
@@ -196,7 +210,6 @@ fn measure(
                 mapper,
                 accuracy: accuracy::measure(subject, mapper, &mut jobs),
                 costs: costs.by_ref().take(cost::ORDERS.len()).collect(),
-                kernel: of(kernel, subject.name, mapper),
             });
             let rows = rows.collect();
             if SHOWN.contains(name) || scenes.len() == 1 {
@@ -231,16 +244,8 @@ fn measure(
         unrolling,
         tilts: seeds::tilts(),
         column,
+        kernel: None,
     }
-}
-
-/// Those of the kernel's figures that are of a mapper on a scene.
-fn of(kernel: &[KernelFigures], scene: &str, mapper: Mapper) -> Vec<KernelFigures> {
-    let name = mapper.to_string();
-    let same = kernel
-        .iter()
-        .filter(|k| k.scene == scene && k.mapper == name);
-    same.cloned().collect()
 }
 
 /// The errors down the longest column of a subject's first picture.
@@ -297,6 +302,21 @@ impl Found {
         );
         let trials = seeds::cells(&trials);
 
+        let mut extra = vec![(
+            String::from("aims"),
+            "What was aimed at, and what this run measured.".to_string(),
+            kernel::targets(&self.tables, &self.swept, self.kernel.as_ref()),
+        )];
+        if let Some(measured) = &self.kernel {
+            let about = format!(
+                "In QEMU {}: instructions under `-icount shift=0`, exact; writes and reads of a \
+                 picture of the ball, exact; times of its whole frame under plain TCG, medians of \
+                 five rounds (least to most).",
+                measured.qemu
+            );
+            extra.push(("the kernel".into(), about, kernel::cells(measured)));
+            put("kernel.csv", &table::plain_csv(&kernel::cells(measured)))?;
+        }
         let mut text = String::from("# What accuracy costs\n\n");
         for line in about {
             text += &format!("{line}\n\n");
@@ -304,6 +324,11 @@ impl Found {
         for table in &tables {
             text += &format!("## {}\n\n{}.\n\n", table.scene, table.about);
             text += &table::markdown(&table.cells());
+            text.push('\n');
+        }
+        for (title, about, cells) in &extra {
+            text += &format!("## {title}\n\n{about}\n\n");
+            text += &table::markdown(cells);
             text.push('\n');
         }
         text += "## The seeds on trial\n\n";
@@ -330,6 +355,7 @@ impl Found {
                 let about = format!("{}.", table.about);
                 (table.scene.clone(), about, table.cells())
             })
+            .chain(extra)
             .collect();
         let page = Page {
             about,
@@ -451,33 +477,20 @@ mod tests {
         let mappers = ["affine", "packed", "linear-16", "exact"];
         let mappers = mappers.map(|name| Mapper::parse(name).unwrap());
         let effort = Effort { slice: 1 };
-        let kernel = [KernelFigures {
-            scene: "tilted".into(),
-            mapper: "packed".into(),
-            order: Order::Planes,
-            instructions: 6.25,
-            port_writes: 4,
-            stores: 39_824,
-            time: 0.75,
-        }];
         fs::create_dir(out.path().join("pictures")).unwrap();
-        let found = measure(&["tilted", "wall"], &mappers, 1, effort, &kernel);
+        let found = measure(&["tilted", "wall"], &mappers, 1, effort);
         found.write(out.path(), &["about".into()]).unwrap();
         let read = |name: &str| fs::read_to_string(out.path().join(name)).unwrap();
         let csv = read("trade.csv");
         assert_eq!(csv.lines().count(), 1 + 2 * 4 * 2);
-        let kernel = csv
-            .lines()
-            .filter(|line| line.ends_with(",6.25,4,39824,0.75"));
-        assert_eq!(kernel.count(), 1);
         assert_eq!(read("sweep.csv").lines().count(), 1 + SWEEPS * 4 * 2);
         let md = read("trade.md");
         for part in [
             "## all scenes",
             "## tilted",
             "## wall",
+            "## aims",
             "## The seeds on trial",
-            "6.25",
         ] {
             assert!(md.contains(part), "{part}");
         }

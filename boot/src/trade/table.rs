@@ -9,25 +9,6 @@ use super::clock;
 use super::cost::{Cost, Costs, Swept};
 use super::stats::Spread;
 
-/// What was counted and timed in the kernel under QEMU, of a mapper on a scene in one order.
-#[derive(Clone, Debug, PartialEq)]
-pub struct KernelFigures {
-    /// The scene's name.
-    pub scene: String,
-    /// The mapper's name.
-    pub mapper: String,
-    /// The order.
-    pub order: Order,
-    /// Instructions a pixel, counted.
-    pub instructions: f64,
-    /// Port writes for a picture, counted.
-    pub port_writes: u64,
-    /// Stores to video memory for a picture, counted.
-    pub stores: u64,
-    /// QEMU's time as a ratio to `packed` in the polygons' order.
-    pub time: f64,
-}
-
 /// A mapper's figures on a scene, or on all of them.
 #[derive(Clone, Debug)]
 pub struct Row {
@@ -37,8 +18,6 @@ pub struct Row {
     pub accuracy: Accuracy,
     /// Its cost in each of [`ORDERS`](super::cost::ORDERS).
     pub costs: Vec<Costs>,
-    /// What the kernel said, if it was asked.
-    pub kernel: Vec<KernelFigures>,
 }
 
 impl Row {
@@ -115,7 +94,6 @@ impl Table {
                 mapper: first.mapper,
                 accuracy,
                 costs: costs.collect(),
-                kernel: Vec::new(),
             });
         }
         let names: Vec<_> = tables.iter().map(|table| &table.scene[..]).collect();
@@ -141,19 +119,6 @@ impl Table {
             "picture, planes".into(),
             "picture to packed".into(),
         ]);
-        let kernel = self.rows.iter().any(|row| !row.kernel.is_empty());
-        if kernel {
-            head.extend(
-                [
-                    "in QEMU: order",
-                    "instructions",
-                    "port writes",
-                    "stores",
-                    "time to packed",
-                ]
-                .map(String::from),
-            );
-        }
         let mut cells = vec![head];
         for row in &self.rows {
             let accuracy = &row.accuracy;
@@ -182,19 +147,6 @@ impl Table {
             for (k, twin) in twins.filter_map(|(k, costs)| Some((k, costs.twin?))) {
                 // After the accuracy's columns, those of the loops.
                 line[6 + k] += &format!("; {:.2} without BMI2", twin.time.median);
-            }
-            if kernel {
-                let best = row.kernel.iter().min_by(|a, b| a.time.total_cmp(&b.time));
-                line.extend(match best {
-                    None => vec![String::new(); 5],
-                    Some(figures) => vec![
-                        figures.order.to_string(),
-                        format!("{:.2}", figures.instructions),
-                        figures.port_writes.to_string(),
-                        figures.stores.to_string(),
-                        format!("{:.2}", figures.time),
-                    ],
-                });
             }
             cells.push(line);
         }
@@ -252,6 +204,15 @@ pub fn decibels(psnr: f64) -> String {
     }
 }
 
+/// Lines of cells for programs.
+pub fn plain_csv(cells: &[Vec<String>]) -> String {
+    let line = |cells: &Vec<String>| {
+        let fields: Vec<_> = cells.iter().map(|cell| field(cell)).collect();
+        fields.join(",") + "\n"
+    };
+    cells.iter().map(line).collect()
+}
+
 /// All figures: a line a scene, mapper and order.
 pub fn csv(tables: &[Table]) -> String {
     let mut text =
@@ -265,7 +226,7 @@ pub fn csv(tables: &[Table]) -> String {
         }
     }
     text += ",loops_time_without_bmi2";
-    text += ",kernel_instructions,kernel_port_writes,kernel_stores,kernel_time_to_packed\n";
+    text.push('\n');
     for table in tables {
         for row in &table.rows {
             let accuracy = &row.accuracy;
@@ -297,13 +258,6 @@ pub fn csv(tables: &[Table]) -> String {
                 text.push(',');
                 if let Some(twin) = costs.twin {
                     let _ = write!(text, "{:.4}", twin.time.median);
-                }
-                match row.kernel.iter().find(|k| k.order == costs.order) {
-                    None => text += ",,,,",
-                    Some(k) => {
-                        let (ports, stores) = (k.port_writes, k.stores);
-                        let _ = write!(text, ",{},{ports},{stores},{}", k.instructions, k.time);
-                    }
                 }
                 text.push('\n');
             }
@@ -379,7 +333,6 @@ pub(super) mod tests {
                 mapper,
                 accuracy,
                 costs: costs.to_vec(),
-                kernel: Vec::new(),
             });
         }
         Table {
@@ -391,29 +344,18 @@ pub(super) mod tests {
 
     #[test]
     fn csv_has_as_many_fields_in_every_line() {
-        let mut tables = vec![made_up("a", 1.0), made_up("b,\"c\"", 2.0)];
-        let row = &mut tables[0].rows[0];
-        row.kernel.push(KernelFigures {
-            scene: "a".into(),
-            mapper: row.mapper.to_string(),
-            order: Order::Planes,
-            instructions: 4.5,
-            port_writes: 7,
-            stores: 9,
-            time: 0.5,
-        });
+        let tables = [made_up("a", 1.0), made_up("b,\"c\"", 2.0)];
         let text = csv(&tables);
         let mut lines = text.lines();
         let fields = |line: &str| line.replace("\"b,\"\"c\"\"\"", "b").split(',').count();
         let head = lines.next().unwrap();
-        assert_eq!(fields(head), 10 + 18 + 1 + 4);
+        assert_eq!(fields(head), 10 + 18 + 1);
         let mut count = 0;
         for line in lines {
             assert_eq!(fields(line), fields(head), "{line}");
             count += 1;
         }
         assert_eq!(count, 2 * Mapper::ALL.len() * 2);
-        assert!(text.lines().nth(2).unwrap().ends_with(",4.5,7,9,0.5"));
         assert!(text.ends_with('\n') && !text.contains("\n\n"));
     }
 

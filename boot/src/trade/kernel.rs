@@ -1,0 +1,230 @@
+//! What the measuring kernel said, as a table, and what was aimed at beside what was measured.
+
+use std::fmt::Display;
+
+use texmap::{Mapper, Order};
+
+use super::cost::{ANGLE, LENGTH, Swept};
+use super::table::Table;
+use crate::measure::{Cpu, Measured, Row, Spread};
+
+/// The kernel's table: a line for each mapper in each order, figures of the plain CPU model, and of
+/// the other what differs.
+pub fn cells(measured: &Measured) -> Vec<Vec<String>> {
+    let head = [
+        "mapper",
+        "order",
+        "instructions a pixel, screen",
+        "the same with bit-extract",
+        "instructions a pixel, ball",
+        "port writes",
+        "stores",
+        "loads",
+        "time over bare stores",
+        "time over presenting",
+    ];
+    let mut cells = vec![head.map(String::from).to_vec()];
+    for row in of(measured, Cpu::Baseline) {
+        let max = of(measured, Cpu::Max);
+        let max = max
+            .iter()
+            .find(|other| other.mapper == row.mapper && other.order == row.order);
+        let accesses = &row.accesses;
+        let sum = |part: fn(&modex::Tally) -> u64| {
+            part(&accesses.draw) + part(&accesses.erase) + part(&accesses.flip)
+        };
+        cells.push(vec![
+            row.mapper.to_string(),
+            row.order.to_string(),
+            format!("{:.2}", row.instructions_a_pixel()),
+            max.map_or(String::new(), |max| {
+                format!("{:.2}", max.instructions_a_pixel())
+            }),
+            format!("{:.1}", row.cost(row.whole_frame()).instructions_a_pixel()),
+            sum(|tally| tally.ports).to_string(),
+            sum(|tally| tally.stores).to_string(),
+            accesses.loads.to_string(),
+            spread(row.frame_over_bare()),
+            spread(row.frame_over_present()),
+        ]);
+    }
+    cells
+}
+
+fn spread(ratio: Spread) -> String {
+    let Spread {
+        median,
+        least,
+        most,
+        ..
+    } = ratio;
+    format!("{median:.2} ({least:.2} to {most:.2})")
+}
+
+fn of(measured: &Measured, cpu: Cpu) -> &[Row] {
+    let on = measured.cpus.iter().find(|on| on.cpu == cpu);
+    on.map_or(&[], |on| &on.rows)
+}
+
+/// A figure of the run, if all that it needs was measured.
+type Figure = Option<f64>;
+
+/// What was aimed at, what came out, and whether it is met.
+pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -> Vec<Vec<String>> {
+    let mut cells = vec![
+        ["what", "aimed at", "measured", ""]
+            .map(String::from)
+            .to_vec(),
+    ];
+    let mut add = |what: &str, aimed: f64, most: bool, figure: Figure| {
+        let bound = if most { "at most" } else { "at least" };
+        let said = figure.map_or("not measured".into(), |figure| format!("{figure:.2}"));
+        let met = match figure.map(|figure| {
+            if most {
+                figure <= aimed
+            } else {
+                figure >= aimed
+            }
+        }) {
+            Some(true) => "met",
+            Some(false) => "missed",
+            None => "",
+        };
+        let aimed = format!("{bound} {aimed}");
+        cells.push(vec![what.into(), aimed, said, met.into()]);
+    };
+    let host = Host { tables, swept };
+    add(
+        "best affine column loop by planes, over a bare load and store",
+        1.15,
+        true,
+        host.best(Order::Planes)
+            .map(|swept| swept.cost.to_bare.median),
+    );
+    let best = host.best(Order::Planes).map(|swept| swept.cost.time.median);
+    add(
+        "`packed` by polygons over the best by planes",
+        2.5,
+        false,
+        over(host.time("packed", Order::Polygons), best),
+    );
+    add(
+        "`row-multiply` by polygons over the best by planes, in RAM",
+        4.0,
+        false,
+        over(host.time("row-multiply", Order::Polygons), best),
+    );
+    let screen = |cpu, mapper: fn(Mapper) -> bool| -> Figure {
+        let rows = of(measured?, cpu).iter();
+        let figures = rows
+            .filter(|row| mapper(row.mapper))
+            .map(Row::instructions_a_pixel);
+        figures.min_by(f64::total_cmp)
+    };
+    let affine = |mapper| matches!(mapper, Mapper::Affine(_));
+    let multiply = |mapper| Some(mapper) == Mapper::parse("row-multiply");
+    add(
+        "`row-multiply` over the best affine column, kernel instructions",
+        5.0,
+        false,
+        over(screen(Cpu::Max, multiply), screen(Cpu::Max, affine)),
+    );
+    let what = "instructions a pixel of the best affine loop, full screen, set-up included";
+    add(what, 6.6, true, screen(Cpu::Baseline, affine));
+    let what = "the same with bit-extract";
+    add(what, 4.6, true, screen(Cpu::Max, affine));
+    add(
+        "`linear-16` over the best affine loop, by planes",
+        1.6,
+        true,
+        over(host.time("linear-16", Order::Planes), best),
+    );
+    add(
+        "`within-1/2` over `affine` on the ball, whole pictures",
+        1.25,
+        true,
+        over(
+            host.picture("ball", "within-1/2"),
+            host.picture("ball", "affine"),
+        ),
+    );
+    add(
+        "`exact` over `within-1/2` on the grazing floor, whole pictures",
+        3.0,
+        false,
+        over(
+            host.picture("grazing-16", "exact"),
+            host.picture("grazing-16", "within-1/2"),
+        ),
+    );
+    let masks = |order| -> Figure {
+        let rows = of(measured?, Cpu::Baseline).iter();
+        let mut rows = rows.filter(|row| row.mapper == Mapper::default() && row.order == order);
+        Some(rows.next()?.accesses.draw.map_mask as f64)
+    };
+    let what = "Map Mask writes of a picture of the ball by planes, drawing";
+    add(what, 4.0, true, masks(Order::Planes));
+    let frame = |ratio: fn(&Row) -> f64| -> Figure {
+        let rows = of(measured?, Cpu::Baseline).iter().map(ratio);
+        rows.min_by(f64::total_cmp)
+    };
+    add(
+        "frame of the ball under TCG over bare byte stores of its pixels, best way",
+        0.75,
+        true,
+        frame(|row| row.frame_over_bare().median),
+    );
+    add(
+        "frame of the ball under TCG over presenting it already drawn, best way",
+        1.25,
+        true,
+        frame(|row| row.frame_over_present().median),
+    );
+    cells
+}
+
+fn over(a: Figure, b: Figure) -> Figure {
+    Some(a? / b?)
+}
+
+/// What was measured in RAM.
+struct Host<'a> {
+    tables: &'a [Table],
+    swept: &'a [Swept],
+}
+
+impl Host<'_> {
+    /// The long runs of an order.
+    fn long(&self, order: Order) -> impl Iterator<Item = &Swept> {
+        let of = move |swept: &&Swept| {
+            swept.length == LENGTH && swept.angle == ANGLE && swept.order == order
+        };
+        self.swept.iter().filter(of)
+    }
+
+    /// The affine column loop that is fastest on long runs.
+    fn best(&self, order: Order) -> Option<&Swept> {
+        let affine = self
+            .long(order)
+            .filter(|swept| matches!(swept.mapper, Mapper::Affine(_)));
+        affine.min_by(|a, b| a.cost.time.median.total_cmp(&b.cost.time.median))
+    }
+
+    /// A mapper's time on long runs.
+    fn time(&self, mapper: &str, order: Order) -> Figure {
+        let swept = self
+            .long(order)
+            .find(|swept| swept.mapper.to_string() == mapper);
+        swept.map(|swept| swept.cost.time.median)
+    }
+
+    /// The time of a scene's picture in the cheaper of the orders.
+    fn picture(&self, scene: &str, mapper: impl Display) -> Figure {
+        let table = self.tables.iter().find(|table| table.scene == scene)?;
+        let row = table
+            .rows
+            .iter()
+            .find(|row| row.name() == mapper.to_string())?;
+        Some(row.best().picture.time.median)
+    }
+}
