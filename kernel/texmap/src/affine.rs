@@ -40,7 +40,7 @@ impl Side {
             return Self::default();
         };
         let length = i64::from(to) - i64::from(from);
-        let offset = coverage::offset(first, from);
+        let offset = i64::from(coverage::offset(first, from));
         let along = |a: i32, b: i32| Along::new(a, i64::from(b - a), length, first, offset, 16);
         Self {
             u: along(a.u, b.u),

@@ -34,8 +34,13 @@
 //! along them: columns have (p, q) = (x, y), rows (y, x).
 //!
 //! With pa < pb the first cell past an edge is a floor of `N / (256 dp)`, N an integer that
-//! grows by `256 dq` from line to line: quotient and remainder are stepped, so there is no
-//! rounding to accumulate. |N| < 2^49 within [`MAX_COORDINATE`], in either scan.
+//! grows by `256 dq` from line to line. N's last 8 bits never change, and are cut: of
+//! floor(N / 256) / dp quotient and remainder are stepped, so there is no rounding to accumulate.
+//! |N| < 2^49 within [`MAX_COORDINATE`], in either scan; all that is stepped fits 32 bits.
+//!
+//! Between two vertices, in the order of the lines, the same edges cross every line: which they
+//! are is asked once for such a stretch. In a convex polygon they are two, and the smaller cell
+//! comes first: there is nothing to sort.
 
 use crate::along::Along;
 use crate::{MAX_COORDINATE, MAX_SIDES, Point};
@@ -62,9 +67,10 @@ pub enum Axis {
     Right,
 }
 
-/// Inside pixels without a gap, in one line: a column from [`columns`], a row from [`rows`].
+/// Inside pixels without a gap, in one line: a column from [`columns`], a row from [`rows`]; of
+/// [`spans`] without the crossings, `End` being `()`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Run {
+pub struct Run<End = Crossing> {
     /// The column's x, or the row's y.
     pub line: u16,
     /// The first pixel: its y in a column, its x in a row.
@@ -72,7 +78,7 @@ pub struct Run {
     /// Pixels, at least 1; all of them are on the screen.
     pub len: u16,
     /// Where the line enters the polygon and where it leaves it. Either may be off the screen.
-    pub between: [Crossing; 2],
+    pub between: [End; 2],
 }
 
 /// Where a side of the polygon meets the middle of a line.
@@ -85,82 +91,145 @@ pub struct Crossing {
     pub at: i64,
 }
 
+/// What a scan tells of where a side meets a line.
+trait End: Copy + Default {
+    /// What it is made of, for every side.
+    type Along: Copy + Default;
+
+    /// That of a side from q = `a` on that rises by `dq` in `dp`, and is `p` further at line `first`.
+    fn along(a: i32, dq: i32, dp: i32, first: i32, p: i32) -> Self::Along;
+
+    /// Where `side` meets `line`.
+    fn new(side: usize, along: &Self::Along, line: i32) -> Self;
+
+    /// Its order among crossings of the same cell.
+    fn at(&self) -> i64;
+}
+
+impl End for Crossing {
+    type Along = Along;
+
+    fn along(a: i32, dq: i32, dp: i32, first: i32, p: i32) -> Along {
+        Along::new(a, dq.into(), dp.into(), first, p.into(), 24)
+    }
+
+    fn new(side: usize, along: &Along, line: i32) -> Self {
+        let at = along.at(line);
+        Self { side, at }
+    }
+
+    fn at(&self) -> i64 {
+        self.at
+    }
+}
+
+/// The pixels are all that is asked for.
+impl End for () {
+    type Along = ();
+
+    fn along(_: i32, _: i32, _: i32, _: i32, _: i32) {}
+
+    fn new(_: usize, (): &(), _: i32) {}
+
+    fn at(&self) -> i64 {
+        0
+    }
+}
+
 /// What makes a scan one by columns or by rows.
 struct Lines {
     /// Lines on the screen, and pixels in each.
     count: i32,
-    cells: i64,
+    cells: i32,
     /// (p, q) of a point.
     place: fn(Point) -> (i32, i32),
     /// Whether a centre on the crossing is past the edge, by the edge's dq where dp > 0.
-    tie: fn(i64) -> bool,
+    tie: fn(i32) -> bool,
 }
 
 const COLUMNS: Lines = Lines {
     count: WIDTH as i32,
-    cells: HEIGHT as i64,
+    cells: HEIGHT as i32,
     place: |point| (point.x, point.y),
     tie: |dy| dy <= 0,
 };
 
 const ROWS: Lines = Lines {
     count: HEIGHT as i32,
-    cells: WIDTH as i64,
+    cells: WIDTH as i32,
     place: |point| (point.y, point.x),
     tie: |_| true,
 };
 
 /// An edge that crosses at least one line of the screen.
 #[derive(Clone, Copy, Default)]
-struct Edge {
+struct Edge<A> {
     side: usize,
     /// Lines `first..end`.
     first: i32,
     end: i32,
-    /// The first cell past the edge in the current line, and what of N is left over.
-    cell: i64,
-    left_over: i64,
-    cell_step: i64,
-    left_over_step: i64,
-    divisor: i64,
-    along: Along,
+    /// The first cell past the edge in the current line, and what of floor(N / 256) is left over:
+    /// at most a step further than the edge goes, below 2^26, and 0 to `divisor`.
+    cell: i32,
+    left_over: i32,
+    cell_step: i32,
+    left_over_step: i32,
+    /// dp, below 2^24.
+    divisor: i32,
+    along: A,
 }
 
-impl Edge {
+impl<A: Copy> Edge<A> {
     /// The edge from `a` to `b` in either order, or nothing if no line of the screen meets it.
-    fn new(side: usize, a: (i32, i32), b: (i32, i32), lines: &Lines) -> Option<Self> {
+    #[inline]
+    fn new<E: End<Along = A>>(
+        side: usize,
+        a: (i32, i32),
+        b: (i32, i32),
+        lines: &Lines,
+    ) -> Option<Self> {
         // Always forward: neighbours walk a shared edge with the same bits.
         let (a, b) = if a.0 <= b.0 { (a, b) } else { (b, a) };
         let (first, end) = crossed(a.0, b.0, lines.count)?;
-        let dp = i64::from(b.0) - i64::from(a.0);
-        let dq = i64::from(b.1) - i64::from(a.1);
+        let (dp, dq) = (b.0 - a.0, b.1 - a.1);
         let p = offset(first, a.0);
-        let divisor = 256 * dp;
-        let tie = if (lines.tie)(dq) {
-            divisor - 1
-        } else {
-            divisor
-        };
-        let n = (i64::from(a.1) - 128) * dp + p * dq + tie;
+        let tie = 256 * i64::from(dp) - i64::from((lines.tie)(dq));
+        let n = i64::from(a.1 - 128) * i64::from(dp) + i64::from(p) * i64::from(dq) + tie;
+        let (cell, left_over) = divided(n >> 8, dp);
+        let (cell_step, left_over_step) = (dq.div_euclid(dp), dq.rem_euclid(dp));
         Some(Self {
             side,
             first,
             end,
-            cell: n.div_euclid(divisor),
-            left_over: n.rem_euclid(divisor),
-            cell_step: dq.div_euclid(dp),
-            left_over_step: 256 * dq.rem_euclid(dp),
-            divisor,
-            along: Along::new(a.1, dq, dp, first, p, 24),
+            cell,
+            left_over,
+            cell_step,
+            left_over_step,
+            divisor: dp,
+            along: E::along(a.1, dq, dp, first, p),
         })
     }
 
+    #[inline]
     fn advance(&mut self) {
         self.cell += self.cell_step;
         self.left_over += self.left_over_step;
         if self.left_over >= self.divisor {
             self.left_over -= self.divisor;
             self.cell += 1;
+        }
+    }
+}
+
+/// Quotient, rounded down, and remainder; the quotient fits. Near the screen, which is nearly
+/// always, 32 bits hold all of it, and the division costs a fraction.
+#[inline]
+fn divided(n: i64, d: i32) -> (i32, i32) {
+    match i32::try_from(n) {
+        Ok(n) => (n.div_euclid(d), n.rem_euclid(d)),
+        Err(_) => {
+            let d = i64::from(d);
+            (n.div_euclid(d) as i32, n.rem_euclid(d) as i32)
         }
     }
 }
@@ -174,8 +243,8 @@ pub(crate) fn crossed(a: i32, b: i32, count: i32) -> Option<(i32, i32)> {
 }
 
 /// How far the centre of `line` is from `a`.
-pub(crate) fn offset(line: i32, a: i32) -> i64 {
-    i64::from(line) * 256 + 128 - i64::from(a)
+pub(crate) fn offset(line: i32, a: i32) -> i32 {
+    line * 256 + 128 - a
 }
 
 /// Gives `sink` every run of inside pixels in every column of the screen, from left to right
@@ -184,7 +253,7 @@ pub(crate) fn offset(line: i32, a: i32) -> i64 {
 /// # Errors
 /// A polygon outside the legal range; nothing of it was given to `sink`.
 pub fn columns(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Result<(), Dropped> {
-    scan(polygon, &COLUMNS, sink)
+    scan::<Crossing>(polygon, &COLUMNS, sink)
 }
 
 /// Gives `sink` every run of inside pixels in every row of the screen, downward and in each row
@@ -193,7 +262,7 @@ pub fn columns(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Re
 /// # Errors
 /// A polygon outside the legal range; nothing of it was given to `sink`.
 pub fn rows(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Result<(), Dropped> {
-    scan(polygon, &ROWS, sink)
+    scan::<Crossing>(polygon, &ROWS, sink)
 }
 
 /// [`columns`] or [`rows`].
@@ -211,56 +280,105 @@ pub fn runs(
     }
 }
 
+/// The same runs for those who need no crossings, which cost more than the pixels.
+///
+/// # Errors
+/// As [`columns`] has.
+pub fn spans(
+    axis: Axis,
+    polygon: &[impl Copy + Into<Point>],
+    sink: impl FnMut(Run<()>),
+) -> Result<(), Dropped> {
+    match axis {
+        Axis::Down => scan::<()>(polygon, &COLUMNS, sink),
+        Axis::Right => scan::<()>(polygon, &ROWS, sink),
+    }
+}
+
 #[inline]
-fn scan(
+fn scan<E: End>(
     polygon: &[impl Copy + Into<Point>],
     lines: &Lines,
-    mut sink: impl FnMut(Run),
+    mut sink: impl FnMut(Run<E>),
 ) -> Result<(), Dropped> {
     check(polygon)?;
-    let mut edges = [Edge::default(); MAX_SIDES];
+    let mut edges = [Edge::<E::Along>::default(); MAX_SIDES];
     let mut count = 0;
-    let (mut first, mut end) = (lines.count, 0);
-    for (side, &a) in polygon.iter().enumerate() {
-        let b = polygon[(side + 1) % polygon.len()];
-        let (a, b) = ((lines.place)(a.into()), (lines.place)(b.into()));
-        if let Some(edge) = Edge::new(side, a, b, lines) {
-            first = first.min(edge.first);
-            end = end.max(edge.end);
-            edges[count] = edge;
-            count += 1;
+    let place = |&point| (lines.place)(Into::<Point>::into(point));
+    if let Some(last) = polygon.last() {
+        let mut a = place(last);
+        for (i, b) in polygon.iter().enumerate() {
+            let b = place(b);
+            // It ends in vertex i, and has the number of the one that it begins in.
+            let side = if i == 0 { polygon.len() - 1 } else { i - 1 };
+            if let Some(edge) = Edge::new::<E>(side, a, b, lines) {
+                edges[count] = edge;
+                count += 1;
+            }
+            a = b;
         }
     }
     let edges = &mut edges[..count];
-    for line in first..end {
-        let mut crossings = [(0, Crossing::default()); MAX_SIDES];
-        let mut count = 0;
-        for edge in edges.iter_mut() {
-            if edge.first <= line && line < edge.end {
-                let crossing = Crossing {
-                    side: edge.side,
-                    at: edge.along.at(line),
-                };
-                crossings[count] = (edge.cell, crossing);
-                count += 1;
-                edge.advance();
+    let mut give = |line, [top, bottom]: [(i32, E); 2]| {
+        let [first, end] = [top.0, bottom.0].map(|cell| cell.clamp(0, lines.cells));
+        if first < end {
+            sink(Run {
+                line: line as u16,
+                first: first as u16,
+                len: (end - first) as u16,
+                between: [top.1, bottom.1],
+            });
+        }
+    };
+    let mut crossings = [(0, E::default()); MAX_SIDES];
+    let mut line = 0;
+    // Edges that cross the current line go to the front, those that ended to the back.
+    loop {
+        let (mut active, mut end) = (0, lines.count);
+        for i in 0..edges.len() {
+            let edge = &edges[i];
+            if edge.first > line {
+                end = end.min(edge.first);
+            } else if edge.end > line {
+                end = end.min(edge.end);
+                edges.swap(active, i);
+                active += 1;
             }
         }
-        let crossings = &mut crossings[..count];
-        crossings.sort_unstable_by_key(|&(cell, crossing)| (cell, crossing.at));
-        for pair in crossings.chunks_exact(2) {
-            let [first, end] = [pair[0].0, pair[1].0].map(|cell| cell.clamp(0, lines.cells));
-            if first < end {
-                sink(Run {
-                    line: line as u16,
-                    first: first as u16,
-                    len: (end - first) as u16,
-                    between: [pair[0].1, pair[1].1],
-                });
+        let crossing = |edge: &Edge<E::Along>, line| {
+            let end = E::new(edge.side, &edge.along, line);
+            (edge.cell, end)
+        };
+        match &mut edges[..active] {
+            [] if end == lines.count => return Ok(()),
+            [] => {}
+            [a, b] => {
+                for line in line..end {
+                    let (mut top, mut bottom) = (crossing(a, line), crossing(b, line));
+                    if (bottom.0, bottom.1.at()) < (top.0, top.1.at()) {
+                        (top, bottom) = (bottom, top);
+                    }
+                    give(line, [top, bottom]);
+                    a.advance();
+                    b.advance();
+                }
+            }
+            active => {
+                let crossings = &mut crossings[..active.len()];
+                for line in line..end {
+                    for (edge, place) in active.iter_mut().zip(crossings.iter_mut()) {
+                        *place = crossing(edge, line);
+                        edge.advance();
+                    }
+                    crossings.sort_unstable_by_key(|(cell, end)| (*cell, end.at()));
+                    for pair in crossings.chunks_exact(2) {
+                        give(line, [pair[0], pair[1]]);
+                    }
+                }
             }
         }
+        line = end;
     }
-    Ok(())
 }
 
 /// Whether the scan's arithmetic holds for `polygon`.

@@ -25,7 +25,7 @@
 //! texture's gradient across the line; it is reached. Where c is not above zero on a line, or its
 //! coordinates go further than 4096 texels, its pixels are drawn exactly.
 
-use crate::coverage::{Axis, Dropped, MAX_RUNS, runs};
+use crate::coverage::{Axis, Dropped, MAX_RUNS, spans};
 use crate::job::{self, Job};
 use crate::level::Line;
 use crate::plane::{self, Form, Plane};
@@ -274,7 +274,7 @@ pub(crate) fn jobs(
         });
         now.without(before, |line| opened[line] = to);
     };
-    runs(across, face.polygon, |run| {
+    spans(across, face.polygon, |run| {
         if run.line != here {
             go(here, &before, &now);
             (before, now) = (now, Inside::NOTHING);

@@ -11,7 +11,7 @@
 
 use modex::Column;
 
-use crate::coverage::{Axis, Dropped, runs};
+use crate::coverage::{Axis, Dropped, spans};
 use crate::job::{Job, Walk};
 use crate::plane::{self, Plane};
 use crate::straight::Straight;
@@ -141,7 +141,7 @@ pub(crate) fn jobs(
     let plane = face.plane();
     let level = axis(&plane);
     let axis = level.unwrap_or(Axis::Down);
-    runs(axis, face.polygon, |run| {
+    spans(axis, face.polygon, |run| {
         let job = |first: u16, len, walk| {
             Job::new(axis, run.line, run.first + first, len, face.texture, walk)
         };

@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::affine::{self, Sides};
-use crate::coverage::{Axis, Dropped, Run, runs};
+use crate::coverage::{Axis, Dropped, Run, runs, spans};
 use crate::job::{Job, Rows, Style, Walk};
 use crate::loops::Loop;
 use crate::plane::{self, Anchor, Plane};
@@ -267,8 +267,8 @@ impl Mapper {
             _ => {}
         }
         let number = face.texture;
-        let mut add = |axis, run: &Run, walk| {
-            sink(Job::new(axis, run.line, run.first, run.len, number, walk));
+        let mut add = |axis, line, first, len, walk| {
+            sink(Job::new(axis, line, first, len, number, walk));
         };
         let polygon = face.polygon;
         let drawn_by = self.style().affine;
@@ -277,7 +277,7 @@ impl Mapper {
             runs(axis, polygon, |run| {
                 // The job has the walk that is drawn: its clear twin knows no loops.
                 let walk = drawn_by.walk(rule(&sides, &run));
-                add(axis, &run, Walk::Affine(walk));
+                add(axis, run.line, run.first, run.len, Walk::Affine(walk));
             })
         };
         match self {
@@ -289,10 +289,10 @@ impl Mapper {
         let plane = face.plane();
         if let Self::Within(tolerance) = self {
             let within = Within::new(polygon, plane, texture, tolerance);
-            return runs(Axis::Down, polygon, |run| {
+            return spans(Axis::Down, polygon, |run| {
                 let place = (run.line, run.first);
                 within.parts(place, run.len, texture, &mut |first, len, walk| {
-                    add(Axis::Down, &Run { first, len, ..run }, walk);
+                    add(Axis::Down, run.line, first, len, walk);
                 });
             });
         }
@@ -300,7 +300,7 @@ impl Mapper {
             Self::Nearer if plane.c.right.abs() < plane.c.down.abs() => Axis::Right,
             _ => Axis::Down,
         };
-        runs(axis, polygon, |run| {
+        spans(axis, polygon, |run| {
             let (x, y) = match axis {
                 Axis::Down => (run.line, run.first),
                 Axis::Right => (run.first, run.line),
@@ -312,7 +312,7 @@ impl Mapper {
                 Self::Nearer => Walk::Linear(walk, Pieces::Of(16)),
                 _ => Walk::Exact(walk),
             };
-            add(axis, &run, walk);
+            add(axis, run.line, run.first, run.len, walk);
         })
     }
 }

@@ -24,7 +24,7 @@
 
 use modex::{HEIGHT, WIDTH};
 
-use crate::coverage::{Axis, Dropped, columns};
+use crate::coverage::{Axis, Dropped, spans};
 use crate::job::{Job, Walk};
 use crate::level::Reciprocal;
 use crate::plane::{self, Plane};
@@ -134,7 +134,7 @@ pub(crate) fn jobs(
     mut sink: impl FnMut(Job),
 ) -> Result<(), Dropped> {
     let mut grid = Grid::new(face.plane());
-    columns(face.polygon, |run| {
+    spans(Axis::Down, face.polygon, |run| {
         let x = run.line;
         if x / SIDE != grid.column {
             grid.go(x / SIDE);
