@@ -352,9 +352,11 @@ fn scan<E: End>(
         match &mut edges[..active] {
             [] if end == lines.count => return Ok(()),
             [] => {}
-            [a, b] => {
+            [first, second] => {
+                // The compiler keeps the two in registers: nobody else sees them.
+                let (mut a, mut b) = (*first, *second);
                 for line in line..end {
-                    let (mut top, mut bottom) = (crossing(a, line), crossing(b, line));
+                    let (mut top, mut bottom) = (crossing(&a, line), crossing(&b, line));
                     if (bottom.0, bottom.1.at()) < (top.0, top.1.at()) {
                         (top, bottom) = (bottom, top);
                     }
@@ -362,6 +364,7 @@ fn scan<E: End>(
                     a.advance();
                     b.advance();
                 }
+                (*first, *second) = (a, b);
             }
             active => {
                 let crossings = &mut crossings[..active.len()];

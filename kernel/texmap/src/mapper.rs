@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::affine::{self, Sides};
+use crate::affine::{self, Map, Sides};
 use crate::coverage::{Axis, Dropped, Run, runs, spans};
 use crate::job::{Job, Rows, Style, Walk};
 use crate::loops::Loop;
@@ -271,6 +271,14 @@ impl Mapper {
             sink(Job::new(axis, line, first, len, number, walk));
         };
         let polygon = face.polygon;
+        if let Self::Affine(drawn_by) = self
+            && let Some(map) = Map::new(polygon, texture)
+        {
+            return spans(Axis::Down, polygon, |run| {
+                let walk = Walk::Affine(drawn_by.walk(map.walk(&run)));
+                add(Axis::Down, run.line, run.first, run.len, walk);
+            });
+        }
         let drawn_by = self.style().affine;
         let mut by_sides = |axis, rule: fn(&Sides, &Run) -> affine::Walk| {
             let sides = Sides::new(polygon, texture, axis)?;

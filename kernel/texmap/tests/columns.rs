@@ -3,17 +3,35 @@
 
 use std::collections::HashMap;
 
-use texmap::affine::{Sides, Walk};
+use texmap::affine::{Map, Sides, Walk};
 use texmap::coverage::{self, Axis, Dropped, Run};
 use texmap::{Texture, Vertex};
 
 /// How the walk down a run is made.
-type Rule = fn(&Sides, &Run) -> Walk;
+type Walker = Box<dyn Fn(&Run) -> Walk>;
+/// That of a polygon; nothing if the rule is not for it.
+type Rule = fn(&[Vertex], &Texture<'_>) -> Option<Walker>;
+
+fn by_sides(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+    let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
+    Some(Box::new(move |run| sides.walk(run)))
+}
+
+fn by_half_steps(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+    let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
+    Some(Box::new(move |run| sides.half_step(run)))
+}
+
+fn by_map(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+    let map = Map::new(polygon, texture)?;
+    Some(Box::new(move |run| map.walk(run)))
+}
 
 fn walks(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Run, Walk)> {
-    let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
     let mut walks = Vec::new();
-    coverage::columns(polygon, |run| walks.push((run, rule(&sides, &run)))).unwrap();
+    if let Some(walk) = rule(polygon, texture) {
+        coverage::columns(polygon, |run| walks.push((run, walk(&run)))).unwrap();
+    }
     walks
 }
 
@@ -60,7 +78,7 @@ fn every_walk_stays_inside_the_texture() {
     println!("seed {seed}");
     let mut random = fastrand::Rng::with_seed(seed);
     let texels = vec![0; 256 * 256];
-    let mut pixels = 0;
+    let (mut pixels, mut mapped) = (0, 0);
     for case in 0..20_000 {
         // The middle of the screen, its corners, and spreads from a pixel to beyond the screen.
         let centre = [(160, 120), (0, 0), (319, 239), (319, 0)][case % 4];
@@ -75,11 +93,13 @@ fn every_walk_stays_inside_the_texture() {
         let polygon: Vec<_> = (0..sides)
             .map(|_| vertex(&mut random, centre, spread, snap, size))
             .collect();
-        let exact = drawn(&polygon, &texture, Sides::walk).len();
-        assert_eq!(drawn(&polygon, &texture, Sides::half_step).len(), exact);
+        let exact = drawn(&polygon, &texture, by_sides).len();
+        assert_eq!(drawn(&polygon, &texture, by_half_steps).len(), exact);
+        mapped += drawn(&polygon, &texture, by_map).len();
         pixels += exact;
     }
     assert!(pixels > 100_000, "only {pixels} pixels were drawn at all");
+    assert!(mapped > 100_000, "only {mapped} pixels by a map");
 }
 
 #[test]
@@ -89,10 +109,12 @@ fn a_coordinate_at_the_textures_border_is_drawn_and_one_beyond_is_not() {
     let triangle = |u, v| {
         [(0, 0, 0, 0), (0, 512, u, 0), (512, 0, 0, v)].map(|(x, y, u, v)| Vertex { x, y, u, v })
     };
-    assert!(!drawn(&triangle(u, v), &texture, Sides::walk).is_empty());
+    assert!(!drawn(&triangle(u, v), &texture, by_sides).is_empty());
+    assert!(!drawn(&triangle(u, v), &texture, by_map).is_empty());
     for (u, v) in [(u + 1, v), (u, v + 1), (-1, v), (u, -1)] {
         let refused = Sides::new(&triangle(u, v), &texture, Axis::Down).map(|_| ());
         assert_eq!(refused, Err(Dropped::OutOfRange), "{u} {v}");
+        assert!(by_map(&triangle(u, v), &texture).is_none(), "{u} {v}");
     }
 }
 
@@ -103,7 +125,7 @@ fn a_triangle_has_its_one_affine_map() {
     let mut random = fastrand::Rng::with_seed(seed);
     let texels = [0; 64 * 16];
     let texture = Texture::new(&texels, 64, 16).unwrap();
-    let mut compared = 0;
+    let mut compared = [0; 2];
     for _ in 0..20_000 {
         let polygon: Vec<_> = (0..3)
             .map(|_| vertex(&mut random, (160 * 256, 120 * 256), 30 * 256, 1, (64, 16)))
@@ -111,7 +133,14 @@ fn a_triangle_has_its_one_affine_map() {
         let [a, b, c] =
             [&polygon[0], &polygon[1], &polygon[2]].map(|p| [p.x, p.y, p.u, p.v].map(i128::from));
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-        for ((x, y), (u, v)) in drawn(&polygon, &texture, Sides::walk) {
+        let (sides, map) = (
+            drawn(&polygon, &texture, by_sides),
+            drawn(&polygon, &texture, by_map),
+        );
+        // 1/128 texel: 2^-8 where a texture is squeezed into a sliver, and 60 pixels of step, each
+        // cut by less than 2^-16. A map has no more than its 3 2^-16 beside the steps'.
+        let walks = sides.into_iter().map(|at| (0, at, 512));
+        for (rule, ((x, y), (u, v)), bound) in walks.chain(map.into_iter().map(|at| (1, at, 63))) {
             let (dx, dy) = (
                 i128::from(x) * 256 + 128 - a[0],
                 i128::from(y) * 256 + 128 - a[1],
@@ -122,14 +151,15 @@ fn a_triangle_has_its_one_affine_map() {
             for (k, actual) in [(2, u), (3, v)] {
                 let exact = a[k] * area + wb * (b[k] - a[k]) + wc * (c[k] - a[k]);
                 let off = (i128::from(actual) * area - exact).abs();
-                // 1/128 texel: 2^-8 where a texture is squeezed into a sliver, and 60 pixels of
-                // step, each cut by less than 2^-16.
-                assert!(off * 128 <= area.abs() << 16, "({x}, {y}) of {polygon:?}");
+                assert!(off <= area.abs() * bound, "({x}, {y}) of {polygon:?}");
             }
-            compared += 1;
+            compared[rule] += 1;
         }
     }
-    assert!(compared > 1_000_000, "only {compared} pixels were compared");
+    assert!(
+        compared.iter().all(|&pixels| pixels > 1_000_000),
+        "only {compared:?} pixels were compared"
+    );
 }
 
 /// No swimming: moved by 1/256 pixel, a texture moves under each pixel by what that is worth and
@@ -160,8 +190,9 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
             [at.x, at.y, at.u, at.v].map(i128::from)
         });
         let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-        let after = drawn(&moved, &texture, Sides::walk);
-        for (at, (u, v)) in drawn(&triangle, &texture, Sides::walk) {
+        let rule = [by_sides, by_map][case / 4 % 2];
+        let after = drawn(&moved, &texture, rule);
+        for (at, (u, v)) in drawn(&triangle, &texture, rule) {
             let Some(&(u_after, v_after)) = after.get(&at) else {
                 continue;
             };
@@ -178,4 +209,55 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
         }
     }
     assert!(compared > 1_000_000, "only {compared} pixels were compared");
+}
+
+/// The corners of the legal range: a half of the texture's width to the pixel, a corner as far out
+/// as it may be, a hair of an area. One step further there is no map.
+#[test]
+fn a_map_holds_at_the_ends_of_its_range() {
+    let texels = vec![0; 256 * 256];
+    let texture = Texture::new(&texels, 256, 256).unwrap();
+    let (left, top) = (160 * 256 - Map::REACH, 120 * 256 - Map::REACH);
+    let (right, bottom) = (left + 2 * Map::REACH, top + 2 * Map::REACH);
+    let side = 256 << 16;
+    let triangle =
+        |corners: [(i32, i32, i32, i32); 3]| corners.map(|(x, y, u, v)| Vertex { x, y, u, v });
+    let widest = [
+        (left, top, 0, side),
+        (right, top, side, 0),
+        (left, bottom, side, side),
+    ];
+    let drawn = drawn(&triangle(widest), &texture, by_map);
+    // Its long side goes through the middle of the screen.
+    assert!(drawn.len() > modex::WIDTH * modex::HEIGHT * 2 / 5);
+    for corner in 0..3 {
+        for (x, y) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+            let mut beyond = triangle(widest);
+            beyond[corner].x += x;
+            beyond[corner].y += y;
+            let inside =
+                |at: &Vertex| (left..=right).contains(&at.x) && (top..=bottom).contains(&at.y);
+            let legal = beyond.iter().all(inside);
+            assert_eq!(by_map(&beyond, &texture).is_some(), legal, "{beyond:?}");
+        }
+    }
+    // 256 texels a pixel are too many, in either direction and sense.
+    let steep =
+        |(x, y): (i32, i32), u| triangle([(0, 0, u, 0), (x, y, side - u, 0), (y, -x, u, 0)]);
+    for (x, y) in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
+        for u in [0, side] {
+            assert!(by_map(&steep((256 * x, 256 * y), u), &texture).is_none());
+            assert!(by_map(&steep((257 * x, 257 * y), u), &texture).is_some());
+        }
+    }
+    // Nothing in it, and nothing but three sides.
+    assert!(
+        by_map(
+            &triangle([(0, 0, 0, 0), (256, 256, 0, 0), (512, 512, 0, 0)]),
+            &texture
+        )
+        .is_none()
+    );
+    let four = [Vertex::default(); 4];
+    assert!(by_map(&four, &texture).is_none());
 }
