@@ -230,6 +230,8 @@ pub struct Map {
     v: Gradient,
     /// The last coordinate inside the texture, across and down.
     last: (i32, i32),
+    /// Whether no corner is so near the texture's border that rounding could lead out of it.
+    inside: bool,
 }
 
 /// A coordinate that is linear on the screen; 32 fraction bits, steps within +-2^40.
@@ -298,10 +300,14 @@ impl Map {
                 step: (down / (1 << 16)) as i32,
             })
         };
+        // 3 2^-16 texel at the first pixel; the step, cut towards zero, leads no further out.
+        let clear = |at: [i32; 3], last: i32| at.iter().all(|at| (4..last - 4).contains(at));
+        let (u, v) = ([a.u, b.u, c.u], [a.v, b.v, c.v]);
         Some(Self {
-            u: gradient([a.u, b.u, c.u])?,
-            v: gradient([a.v, b.v, c.v])?,
+            u: gradient(u)?,
+            v: gradient(v)?,
             last,
+            inside: clear(u, last.0) && clear(v, last.1),
         })
     }
 
@@ -316,6 +322,9 @@ impl Map {
         let walk = |along: &Gradient, last: i32| {
             let first = along.origin + x * along.right + y * along.down;
             let start = first >> 16;
+            if self.inside {
+                return (start as i32, along.step);
+            }
             let stop = start + steps * i64::from(along.step);
             // Without a sign, what is below zero is above every size.
             let inside = |at: i64| at as u64 <= last as u64;

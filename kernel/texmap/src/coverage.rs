@@ -34,9 +34,12 @@
 //! along them: columns have (p, q) = (x, y), rows (y, x).
 //!
 //! With pa < pb the first cell past an edge is a floor of `N / (256 dp)`, N an integer that
-//! grows by `256 dq` from line to line. N's last 8 bits never change, and are cut: of
-//! floor(N / 256) / dp quotient and remainder are stepped, so there is no rounding to accumulate.
-//! |N| < 2^49 within [`MAX_COORDINATE`], in either scan; all that is stepped fits 32 bits.
+//! grows by `256 dq` from line to line. N's last 8 bits never change, and are cut: the cell is the
+//! floor of v = n / dp, n = floor(N / 256), and n grows by dq. v is stepped with 36 fraction bits,
+//! start and step rounded up. So it is above the true v by less than 1 for the start and 1 for each
+//! of at most 319 steps, in units of 2^-36; the true v is a multiple of 1 / dp, and below the next
+//! whole number by at least that, more than 2^12 such units: its floor is never another.
+//! |N| < 2^49 within [`MAX_COORDINATE`], dp <= 2^24, in either scan.
 //!
 //! Between two vertices, in the order of the lines, the same edges cross every line: which they
 //! are is asked once for such a stretch. In a convex polygon they are two, and the smaller cell
@@ -102,12 +105,16 @@ trait End: Copy + Default {
     /// Where `side` meets `line`.
     fn new(side: usize, along: &Self::Along, line: i32) -> Self;
 
+    /// Whether crossings of the same cell may come in any order.
+    const BY_CELL: bool;
+
     /// Its order among crossings of the same cell.
     fn at(&self) -> i64;
 }
 
 impl End for Crossing {
     type Along = Along;
+    const BY_CELL: bool = false;
 
     fn along(a: i32, dq: i32, dp: i32, first: i32, p: i32) -> Along {
         Along::new(a, dq.into(), dp.into(), first, p.into(), 24)
@@ -126,6 +133,7 @@ impl End for Crossing {
 /// The pixels are all that is asked for.
 impl End for () {
     type Along = ();
+    const BY_CELL: bool = true;
 
     fn along(_: i32, _: i32, _: i32, _: i32, _: i32) {}
 
@@ -140,7 +148,7 @@ impl End for () {
 struct Lines {
     /// Lines on the screen, and pixels in each.
     count: i32,
-    cells: i32,
+    cells: i64,
     /// (p, q) of a point.
     place: fn(Point) -> (i32, i32),
     /// Whether a centre on the crossing is past the edge, by the edge's dq where dp > 0.
@@ -149,17 +157,20 @@ struct Lines {
 
 const COLUMNS: Lines = Lines {
     count: WIDTH as i32,
-    cells: HEIGHT as i32,
+    cells: HEIGHT as i64,
     place: |point| (point.x, point.y),
     tie: |dy| dy <= 0,
 };
 
 const ROWS: Lines = Lines {
     count: HEIGHT as i32,
-    cells: WIDTH as i32,
+    cells: WIDTH as i64,
     place: |point| (point.y, point.x),
     tie: |_| true,
 };
+
+/// Fraction bits of a cell.
+const FRACTION: u32 = 36;
 
 /// An edge that crosses at least one line of the screen.
 #[derive(Clone, Copy, Default)]
@@ -168,14 +179,10 @@ struct Edge<A> {
     /// Lines `first..end`.
     first: i32,
     end: i32,
-    /// The first cell past the edge in the current line, and what of floor(N / 256) is left over:
-    /// at most a step further than the edge goes, below 2^26, and 0 to `divisor`.
-    cell: i32,
-    left_over: i32,
-    cell_step: i32,
-    left_over_step: i32,
-    /// dp, below 2^24.
-    divisor: i32,
+    /// The first cell past the edge in the current line, [`FRACTION`] bits; at most a step
+    /// further out than the edge goes: below 2^26 cells.
+    cell: i64,
+    step: i64,
     along: A,
 }
 
@@ -196,28 +203,16 @@ impl<A: Copy> Edge<A> {
         let tie = 256 * i64::from(dp) - i64::from((lines.tie)(dq));
         let n = i64::from(a.1 - 128) * i64::from(dp) + i64::from(p) * i64::from(dq) + tie;
         let (cell, left_over) = divided(n >> 8, dp);
-        let (cell_step, left_over_step) = (dq.div_euclid(dp), dq.rem_euclid(dp));
+        // |dq| <= 2^25 and left_over < dp <= 2^24.
+        let up = |n: i32| -((-i64::from(n) << FRACTION).div_euclid(dp.into()));
         Some(Self {
             side,
             first,
             end,
-            cell,
-            left_over,
-            cell_step,
-            left_over_step,
-            divisor: dp,
+            cell: (i64::from(cell) << FRACTION) + up(left_over),
+            step: up(dq),
             along: E::along(a.1, dq, dp, first, p),
         })
-    }
-
-    #[inline]
-    fn advance(&mut self) {
-        self.cell += self.cell_step;
-        self.left_over += self.left_over_step;
-        if self.left_over >= self.divisor {
-            self.left_over -= self.divisor;
-            self.cell += 1;
-        }
     }
 }
 
@@ -304,23 +299,29 @@ fn scan<E: End>(
     check(polygon)?;
     let mut edges = [Edge::<E::Along>::default(); MAX_SIDES];
     let mut count = 0;
+    let (mut line, mut stop) = (lines.count, 0);
     let place = |&point| (lines.place)(Into::<Point>::into(point));
     if let Some(last) = polygon.last() {
         let mut a = place(last);
+        let mut side = polygon.len() - 1;
         for (i, b) in polygon.iter().enumerate() {
             let b = place(b);
-            // It ends in vertex i, and has the number of the one that it begins in.
-            let side = if i == 0 { polygon.len() - 1 } else { i - 1 };
             if let Some(edge) = Edge::new::<E>(side, a, b, lines) {
+                line = line.min(edge.first);
+                stop = stop.max(edge.end);
                 edges[count] = edge;
                 count += 1;
             }
-            a = b;
+            (a, side) = (b, i);
         }
     }
     let edges = &mut edges[..count];
-    let mut give = |line, [top, bottom]: [(i32, E); 2]| {
-        let [first, end] = [top.0, bottom.0].map(|cell| cell.clamp(0, lines.cells));
+    let mut give = |line, [top, bottom]: [(i64, E); 2]| {
+        let (mut first, mut end) = (top.0 >> FRACTION, bottom.0 >> FRACTION);
+        // Nearly all begin and end on the screen: a look at both signs.
+        if first | (lines.cells - end) < 0 {
+            [first, end] = [first, end].map(|cell| cell.clamp(0, lines.cells));
+        }
         if first < end {
             sink(Run {
                 line: line as u16,
@@ -330,18 +331,18 @@ fn scan<E: End>(
             });
         }
     };
-    let mut crossings = [(0, E::default()); MAX_SIDES];
-    let mut line = 0;
-    // Edges that cross the current line go to the front, those that ended to the back.
-    loop {
-        let (mut active, mut end) = (0, lines.count);
+    while line < stop {
+        // Edges that cross the line go to the front, the others are not yet there, or ended.
+        let (mut active, mut end) = (0, stop);
         for i in 0..edges.len() {
             let edge = &edges[i];
             if edge.first > line {
                 end = end.min(edge.first);
             } else if edge.end > line {
                 end = end.min(edge.end);
-                edges.swap(active, i);
+                if active < i {
+                    edges.swap(active, i);
+                }
                 active += 1;
             }
         }
@@ -349,31 +350,37 @@ fn scan<E: End>(
             let end = E::new(edge.side, &edge.along, line);
             (edge.cell, end)
         };
+        // By cells; within one by where the sides cross the line.
+        let key = |&(cell, end): &(i64, E)| (cell >> FRACTION, end.at());
         match &mut edges[..active] {
-            [] if end == lines.count => return Ok(()),
             [] => {}
             [first, second] => {
                 // The compiler keeps the two in registers: nobody else sees them.
                 let (mut a, mut b) = (*first, *second);
                 for line in line..end {
                     let (mut top, mut bottom) = (crossing(&a, line), crossing(&b, line));
-                    if (bottom.0, bottom.1.at()) < (top.0, top.1.at()) {
+                    let turned = match E::BY_CELL {
+                        true => bottom.0 < top.0,
+                        false => key(&bottom) < key(&top),
+                    };
+                    if turned {
                         (top, bottom) = (bottom, top);
                     }
                     give(line, [top, bottom]);
-                    a.advance();
-                    b.advance();
+                    a.cell += a.step;
+                    b.cell += b.step;
                 }
                 (*first, *second) = (a, b);
             }
             active => {
+                let mut crossings = [(0, E::default()); MAX_SIDES];
                 let crossings = &mut crossings[..active.len()];
                 for line in line..end {
                     for (edge, place) in active.iter_mut().zip(crossings.iter_mut()) {
                         *place = crossing(edge, line);
-                        edge.advance();
+                        edge.cell += edge.step;
                     }
-                    crossings.sort_unstable_by_key(|(cell, end)| (*cell, end.at()));
+                    crossings.sort_unstable_by_key(key);
                     for pair in crossings.chunks_exact(2) {
                         give(line, [pair[0], pair[1]]);
                     }
@@ -382,6 +389,7 @@ fn scan<E: End>(
         }
         line = end;
     }
+    Ok(())
 }
 
 /// Whether the scan's arithmetic holds for `polygon`.
