@@ -230,12 +230,12 @@ impl<'a, B: Bus> Bench<'a, B> {
             }
             Work::ScreenJobs => ticks(now, &mut || self.make_screen_jobs()),
             Work::ScreenRam => ticks(now, &mut || {
-                order.draw(self.jobs.jobs(), &self.square, self.page, mapper);
+                order.draw(self.jobs, &self.square, self.page, mapper);
             }),
             Work::ScreenCard => {
                 let mut canvas = self.card.begin(background);
                 let ticks = ticks(now, &mut || {
-                    order.draw(self.jobs.jobs(), &self.square, &mut canvas, mapper);
+                    order.draw(self.jobs, &self.square, &mut canvas, mapper);
                 });
                 self.card.flip();
                 ticks
@@ -343,7 +343,7 @@ impl<'a, B: Bus> Bench<'a, B> {
             let took = [
                 ticks(now, &mut || make_jobs(&face, mapper, square, jobs)),
                 ticks(now, &mut || {
-                    order.draw(jobs.jobs(), &square[..], *page, mapper);
+                    order.draw(jobs, &square[..], *page, mapper);
                 }),
             ];
             for (figure, took) in figures.iter_mut().zip(took) {

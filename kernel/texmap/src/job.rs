@@ -1,5 +1,7 @@
 //! Jobs: runs of pixels to draw, and the bounded list that holds them.
 
+use core::iter;
+
 use modex::Destination;
 
 use crate::coverage::Axis;
@@ -285,6 +287,43 @@ impl Coordinates {
 pub struct JobList<const N: usize> {
     jobs: [Job; N],
     len: usize,
+    /// For each job the next in its chain: see [`ByPlane`].
+    next: [u16; N],
+}
+
+/// The jobs of a list, plane by plane.
+///
+/// A column is chained with those of its plane, and what may lie in every plane with its like: a
+/// pass sees its own jobs only.
+#[derive(Debug)]
+pub(crate) struct ByPlane<'a> {
+    jobs: &'a [Job],
+    next: &'a [u16],
+    /// The first job in each plane's chain, and in that of all planes.
+    first: [u16; 5],
+}
+
+impl<'a> ByPlane<'a> {
+    /// The end of a chain, behind every job.
+    const END: u16 = u16::MAX;
+
+    /// The jobs that may have pixels in `plane`, in the order in which they came.
+    #[inline]
+    pub fn plane(&self, plane: u16) -> impl Iterator<Item = &'a Job> {
+        let (jobs, next) = (self.jobs, self.next);
+        let (mut own, mut every) = (self.first[usize::from(plane)], self.first[4]);
+        iter::from_fn(move || {
+            let here = own.min(every);
+            let job = jobs.get(usize::from(here))?;
+            let after = next[usize::from(here)];
+            if here == own {
+                own = after;
+            } else {
+                every = after;
+            }
+            Some(job)
+        })
+    }
 }
 
 impl<const N: usize> JobList<N> {
@@ -307,6 +346,7 @@ impl<const N: usize> JobList<N> {
         Self {
             jobs: [Self::EMPTY; N],
             len: 0,
+            next: [0; N],
         }
     }
 
@@ -326,6 +366,23 @@ impl<const N: usize> JobList<N> {
         &self.jobs[..self.len]
     }
 
+    /// The jobs by planes.
+    pub(crate) fn by_plane(&mut self) -> ByPlane<'_> {
+        const { assert!(N <= ByPlane::END as usize, "a chain's links are 16 bits") };
+        let (jobs, next) = (&self.jobs[..self.len], &mut self.next[..self.len]);
+        let mut first = [ByPlane::END; 5];
+        // From the last on: each goes before those that are chained.
+        for (i, (job, next)) in jobs.iter().zip(next.iter_mut()).enumerate().rev() {
+            let chain = match (job.axis, job.walk) {
+                (Axis::Right, _) | (_, Walk::Free(_)) => 4,
+                (Axis::Down, _) => usize::from(job.x & 3),
+            };
+            *next = first[chain];
+            first[chain] = i as u16;
+        }
+        ByPlane { jobs, next, first }
+    }
+
     /// Empties the list.
     pub fn clear(&mut self) {
         self.len = 0;
@@ -335,5 +392,41 @@ impl<const N: usize> JobList<N> {
 impl<const N: usize> Default for JobList<N> {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// Later jobs lie over earlier ones: no chain may turn them about, and none may lose one.
+    #[test]
+    fn every_plane_has_its_jobs_in_the_order_in_which_they_came() {
+        let seed = fastrand::u64(..);
+        std::println!("seed {seed}");
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut list = JobList::<40>::new();
+        for _ in 0..1000 {
+            list.clear();
+            for y in 0..random.u16(..=40) {
+                let axis = [Axis::Down, Axis::Down, Axis::Right][random.usize(..3)];
+                let walk = JobList::<1>::EMPTY.walk;
+                let job = Job::new(axis, random.u16(..200), random.u16(..200), 1, y, walk);
+                list.push(job).unwrap();
+            }
+            let jobs = list.jobs().to_vec();
+            let chains = list.by_plane();
+            for plane in 0..4 {
+                let own = jobs
+                    .iter()
+                    .filter(|job| job.axis == Axis::Right || job.x & 3 == plane);
+                let found: Vec<_> = chains.plane(plane).map(|job| job.texture).collect();
+                assert_eq!(found, own.map(|job| job.texture).collect::<Vec<_>>());
+            }
+        }
     }
 }

@@ -5,7 +5,7 @@ use core::fmt;
 use modex::Destination;
 
 use crate::mapper::{Face, Mapper};
-use crate::{Job, JobList, Texture};
+use crate::{JobList, Texture};
 
 /// What was drawn, and what was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,9 +71,9 @@ impl Order {
     ///
     /// # Panics
     /// If there is no such texture.
-    pub fn draw<D: Destination>(
+    pub fn draw<D: Destination, const N: usize>(
         self,
-        jobs: &[Job],
+        jobs: &mut JobList<N>,
         textures: &[Texture<'_>],
         destination: &mut D,
         mapper: Mapper,
@@ -81,14 +81,15 @@ impl Order {
         let style = mapper.style();
         match self {
             Self::Polygons => {
-                for job in jobs {
+                for job in jobs.jobs() {
                     job.draw(style, &textures[usize::from(job.texture)], destination);
                 }
             }
             Self::Planes | Self::Buffer => {
+                let jobs = jobs.by_plane();
                 for plane in 0..4 {
                     destination.select(plane);
-                    for job in jobs {
+                    for job in jobs.plane(plane) {
                         let texture = &textures[usize::from(job.texture)];
                         job.draw_in_plane(plane, style, texture, destination);
                     }
@@ -190,6 +191,6 @@ fn draw<D: Destination, const N: usize>(
     order: Order,
 ) {
     const { assert!(N > 0, "a job list needs room for a job") };
-    order.draw(jobs.jobs(), textures, destination, mapper);
+    order.draw(jobs, textures, destination, mapper);
     jobs.clear();
 }
