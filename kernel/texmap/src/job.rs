@@ -112,20 +112,30 @@ impl Job {
     }
 
     /// Draws the run.
+    #[inline]
     pub fn draw(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
-        match (self.walk, self.axis) {
-            (Walk::Free(walk), _) => {
-                self.straight(&walk, |job| job.draw(style, texture, destination));
+        match &self.walk {
+            Walk::Free(walk) => {
+                self.straight(walk, |job| job.draw_line(style, texture, destination));
             }
-            (_, Axis::Down) => {
+            _ => self.draw_line(style, texture, destination),
+        }
+    }
+
+    /// Draws the run, which keeps to its column or row.
+    #[inline]
+    fn draw_line(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
+        match self.axis {
+            Axis::Down => {
                 destination.select(self.x);
                 self.draw_column(style, texture, destination);
             }
-            (_, Axis::Right) => self.draw_row(style, texture, destination),
+            Axis::Right => self.draw_row(style, texture, destination),
         }
     }
 
     /// Draws those of the run's pixels that lie in `plane`, which is selected.
+    #[inline]
     pub fn draw_in_plane(
         &self,
         plane: u16,
@@ -133,13 +143,27 @@ impl Job {
         texture: &Texture<'_>,
         destination: &mut impl Destination,
     ) {
-        match (self.walk, self.axis) {
-            (Walk::Free(walk), _) => self.straight(&walk, |job| {
-                job.draw_in_plane(plane, style, texture, destination);
+        match &self.walk {
+            Walk::Free(walk) => self.straight(walk, |job| {
+                job.draw_line_in_plane(plane, style, texture, destination);
             }),
-            (_, Axis::Down) if self.x & 3 != plane => {}
-            (_, Axis::Down) => self.draw_column(style, texture, destination),
-            (_, Axis::Right) => self.draw_part(plane, texture, destination),
+            _ => self.draw_line_in_plane(plane, style, texture, destination),
+        }
+    }
+
+    /// Draws those pixels of the run in `plane`, which is selected; it keeps to its column or row.
+    #[inline]
+    fn draw_line_in_plane(
+        &self,
+        plane: u16,
+        style: Style,
+        texture: &Texture<'_>,
+        destination: &mut impl Destination,
+    ) {
+        match self.axis {
+            Axis::Down if self.x & 3 != plane => {}
+            Axis::Down => self.draw_column(style, texture, destination),
+            Axis::Right => self.draw_part(plane, texture, destination),
         }
     }
 
