@@ -223,6 +223,9 @@ impl Job {
                     }
                 }
             }
+            (_, Walk::Affine(mut walk)) => {
+                destination.row(self.x, self.y, self.len, || texel(texture, walk.next()));
+            }
             _ => {
                 let mut coordinates = Coordinates::new(self, texture);
                 destination.row(self.x, self.y, self.len, || {
