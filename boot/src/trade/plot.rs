@@ -404,14 +404,7 @@ fn legend(area: &Area<'_>, points: &[Point]) -> anyhow::Result<()> {
     let stroke = FRONT.mix(0.55).stroke_width(2);
     area.draw(&PathElement::new(vec![(x, y), (x + 22, y)], stroke))
         .map_err(failed)?;
-    write(
-        area,
-        "none is better in both",
-        (x + 28, y),
-        12,
-        SOFT,
-        HPos::Left,
-    )
+    write(area, "best", (x + 28, y), 12, SOFT, HPos::Left)
 }
 
 /// Colours of lines, apart for every kind of eyes.
