@@ -175,7 +175,7 @@ const MUTANTS: &[Mutant] = &[
     mutant("level edges not past their own line", COVERAGE,
         "tie: |dy| dy <= 0,", "tie: |dy| dy < 0,"),
     mutant("a slope without its remainder", COVERAGE,
-        "self.left_over += self.left_over_step;", ""),
+        "step: up(dq),", "step: i64::from(dq.div_euclid(dp)) << FRACTION,"),
     mutant("no pre-step to the first centre", COVERAGE,
         "let p = offset(first, a.0);", "let p = 0 * offset(first, a.0);"),
     mutant("an edge closed at its other end", COVERAGE,

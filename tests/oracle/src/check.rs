@@ -3,7 +3,7 @@
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use texmap::coverage::{Dropped, Run, columns, rows};
+use texmap::coverage::{Axis, Dropped, Run, columns, rows, runs as runs_of, spans};
 use texmap::{MAX_SIDES, Point};
 
 use crate::coverage::{Area, Pixels, Row};
@@ -48,6 +48,8 @@ pub enum Wrong {
         /// What the oracle says.
         inside: bool,
     },
+    /// The runs without crossings are others than those with them.
+    Spans(Axis),
     /// Two polygons of the case have the pixel.
     Twice(i32, i32),
     /// The pixel is in the outline and in no polygon, or in a polygon and not in the outline.
@@ -77,6 +79,7 @@ impl fmt::Display for Wrong {
                 let is = if *inside { "inside" } else { "outside" };
                 write!(f, "({x}, {y}) is {is}, and not so by {}", name(scan))
             }
+            Self::Spans(axis) => write!(f, "the spans are not the runs, {axis:?}"),
             Self::Twice(x, y) => write!(f, "({x}, {y}) belongs to two polygons"),
             Self::Gap(x, y) => write!(f, "({x}, {y}) is not as in the outline"),
         }
@@ -91,6 +94,8 @@ pub struct Checker {
     oracle: Pixels,
     scanned: Pixels,
     union: Pixels,
+    /// Line, first pixel and length of each run.
+    runs: Vec<(u16, u16, u16)>,
 }
 
 impl Checker {
@@ -144,7 +149,31 @@ impl Checker {
                 return Err(Wrong::Pixel { scan, x, y, inside });
             }
         }
+        for axis in [Axis::Down, Axis::Right] {
+            self.spans(polygon, axis)?;
+        }
         Ok(area.pixels())
+    }
+
+    /// Compares the runs that come without crossings with those that come with them.
+    fn spans(&mut self, polygon: &[Point], axis: Axis) -> Result<(), Wrong> {
+        let mut runs = std::mem::take(&mut self.runs);
+        runs.clear();
+        let with = runs_of(axis, polygon, |run| {
+            runs.push((run.line, run.first, run.len))
+        });
+        let mut rest = runs.iter();
+        let mut same = true;
+        let without = spans(axis, polygon, |run| {
+            same &= rest.next() == Some(&(run.line, run.first, run.len));
+        });
+        same &= rest.next().is_none() && with == without;
+        self.runs = runs;
+        if same {
+            Ok(())
+        } else {
+            Err(Wrong::Spans(axis))
+        }
     }
 
     /// Fills `scanned` by one of the renderer's scans.
