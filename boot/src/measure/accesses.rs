@@ -7,7 +7,7 @@
 use anyhow::{bail, ensure};
 use cost::{Ask, Bench, Clock, Memory, Work};
 use emulator::Vga;
-use modex::{Bus, Counted, Counts, Lane, Purpose, Tally};
+use modex::{Bus, Counted, Tally};
 use texmap::{Mapper, Order};
 
 /// What a picture of the ball does to the card.
@@ -33,7 +33,7 @@ pub struct Memories {
 /// The measuring kernel's works on the emulated card, with counters and without.
 #[derive(Debug)]
 pub struct Emulated<'a> {
-    counted: Bench<'a, Counted<Loads<Vga>>>,
+    counted: Bench<'a, Counted<Vga>>,
     plain: Bench<'a, Vga>,
 }
 
@@ -47,7 +47,7 @@ const NO_CLOCK: Clock = Clock {
 impl<'a> Emulated<'a> {
     /// Cards as after the mode set.
     pub fn new(memories: &'a mut Memories) -> Self {
-        let counted = Counted::new(Loads::new(Vga::new()));
+        let counted = Counted::new(Vga::new());
         Self {
             counted: Bench::new(&mut memories.counted, counted),
             plain: Bench::new(&mut memories.plain, Vga::new()),
@@ -67,13 +67,11 @@ impl<'a> Emulated<'a> {
         bench.prepare(Work::Present);
         let mut one = || {
             bench.bus().take_counts();
-            let loads = bench.bus().inner().loads;
             bench.run(work, NO_CLOCK.now);
-            let loads = bench.bus().inner().loads - loads;
-            (bench.bus().take_counts(), loads)
+            bench.bus().take_counts()
         };
         let (counts, again) = (one(), one());
-        let faults = bench.bus().inner().bus.take_faults();
+        let faults = bench.bus().inner().take_faults();
         if let Some(fault) = faults.first() {
             bail!("the emulated card finds an access at fault: {fault}");
         }
@@ -81,23 +79,19 @@ impl<'a> Emulated<'a> {
             counts == again,
             "the accesses of {mapper} in the order {order} do not repeat: {counts:?}, {again:?}"
         );
-        let (
-            Counts {
-                draw, erase, flip, ..
-            },
-            loads,
-        ) = counts;
         let pictures = u64::from(work.pictures());
         let each = |tally: Tally| Tally {
             ports: tally.ports / pictures,
             map_mask: tally.map_mask / pictures,
             stores: tally.stores / pictures,
             bytes: tally.bytes / pictures,
+            loads: tally.loads / pictures,
         };
+        let loads: u64 = counts.named().iter().map(|(_, tally)| tally.loads).sum();
         Ok(Accesses {
-            draw: each(draw),
-            erase: each(erase),
-            flip: each(flip),
+            draw: each(counts.draw),
+            erase: each(counts.erase),
+            flip: each(counts.flip),
             loads: loads / pictures,
         })
     }
@@ -111,7 +105,7 @@ impl<'a> Emulated<'a> {
         let plain = check(&mut self.plain, mapper, order);
         let counted = check(&mut self.counted, mapper, order);
         let mut faults = self.plain.bus().take_faults();
-        faults.append(&mut self.counted.bus().inner().bus.take_faults());
+        faults.append(&mut self.counted.bus().inner().take_faults());
         if let Some(fault) = faults.first() {
             bail!("the emulated card finds an access at fault: {fault}");
         }
@@ -142,52 +136,4 @@ fn check<B: Bus>(bench: &mut Bench<'_, B>, mapper: Mapper, order: Order) -> Vec<
     });
     answer.pop();
     answer
-}
-
-/// A bus that passes everything on and counts the loads.
-#[derive(Debug)]
-struct Loads<B> {
-    bus: B,
-    loads: u64,
-}
-
-impl<B> Loads<B> {
-    fn new(bus: B) -> Self {
-        Self { bus, loads: 0 }
-    }
-}
-
-impl<B: Bus> Bus for Loads<B> {
-    fn out8(&mut self, port: u16, value: u8) {
-        self.bus.out8(port, value);
-    }
-
-    fn out16(&mut self, port: u16, value: u16) {
-        self.bus.out16(port, value);
-    }
-
-    fn in8(&mut self, port: u16) -> u8 {
-        self.bus.in8(port)
-    }
-
-    fn in16(&mut self, port: u16) -> u16 {
-        self.bus.in16(port)
-    }
-
-    fn store64(&mut self, at: u16, bytes: u64) {
-        self.bus.store64(at, bytes);
-    }
-
-    fn load8(&mut self, at: u16) -> u8 {
-        self.loads += 1;
-        self.bus.load8(at)
-    }
-
-    fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
-        self.bus.lane(at, len, draw);
-    }
-
-    fn purpose(&mut self, purpose: Purpose) {
-        self.bus.purpose(purpose);
-    }
 }

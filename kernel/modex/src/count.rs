@@ -3,7 +3,7 @@
 use crate::registers::{MAP_MASK, SEQUENCER};
 use crate::{Bus, Lane, Purpose};
 
-/// What was written for one purpose.
+/// What was done for one purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Port writes, Map Mask included.
@@ -14,9 +14,11 @@ pub struct Tally {
     pub stores: u64,
     /// Bytes that those stores carried (each reaches one to four planes).
     pub bytes: u64,
+    /// Loads from video memory.
+    pub loads: u64,
 }
 
-/// What was written, by purpose.
+/// What was done, by purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// [`Purpose::Setup`].
@@ -51,7 +53,7 @@ impl Counts {
     }
 }
 
-/// A bus that passes everything on and counts the writes.
+/// A bus that passes everything on and counts what reaches the card.
 #[derive(Debug)]
 pub struct Counted<B> {
     bus: B,
@@ -69,12 +71,12 @@ impl<B> Counted<B> {
         }
     }
 
-    /// What was written so far.
+    /// What was done so far.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// What was written since the last call, and starts again at zero.
+    /// What was done since the last call, and starts again at zero.
     pub fn take_counts(&mut self) -> Counts {
         core::mem::take(&mut self.counts)
     }
@@ -116,6 +118,7 @@ impl<B: Bus> Bus for Counted<B> {
     }
 
     fn load8(&mut self, at: u16) -> u8 {
+        self.counts.of(self.purpose).loads += 1;
         self.bus.load8(at)
     }
 

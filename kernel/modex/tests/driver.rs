@@ -436,6 +436,7 @@ fn pixels_come_back_from_their_planes_and_nothing_is_stored() {
     card.load(0xFFFE, &mut pixels);
     let expected: Vec<u8> = (0..24).map(|i| (4 * 0xFFFE + i) as u8).collect();
     assert_eq!(pixels[..], expected);
+    assert_eq!(card.bus().counts().setup.loads, 24);
     let recorder = card.bus().inner();
     assert_eq!(recorder.registers[&(GRAPHICS, READ_MAP)], 0);
     let loads = recorder.log.iter().filter(|a| matches!(a, Access::Load(_)));
@@ -460,6 +461,7 @@ fn every_write_is_counted_once_for_its_purpose() {
         map_mask,
         stores,
         bytes,
+        loads: 0,
     };
     assert_eq!(draw, tallies(1, 1, 100, 100));
     // The first time the whole page, and 8 bytes a store.

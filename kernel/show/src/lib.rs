@@ -336,6 +336,7 @@ impl<'a, B: Bus> Show<'a, B> {
                 map_mask,
                 stores,
                 bytes,
+                ..
             } = tally;
             out(format_args!(
                 "{purpose} ports {ports} map-mask {map_mask} stores {stores} bytes {bytes}"
