@@ -115,20 +115,12 @@ impl Golden {
         if show.is_empty() {
             return Err(anyhow::anyhow!("it shows nothing")).with_context(wrong);
         }
-        let unknown = |what, name| anyhow::anyhow!("there is no {what} '{name}'");
         let look = Look {
-            scene: (description.scene)
-                .map(|name| Entry::parse(&name).ok_or_else(|| unknown("scene", name)))
-                .transpose()
+            scene: known("scene", description.scene, Entry::parse)
                 .with_context(wrong)?
                 .map(Named),
-            mapper: (description.mapper)
-                .map(|name| Mapper::parse(&name).ok_or_else(|| unknown("mapper", name)))
-                .transpose()
-                .with_context(wrong)?,
-            order: (description.order)
-                .map(|name| Order::parse(&name).ok_or_else(|| unknown("order", name)))
-                .transpose()
+            mapper: known("mapper", description.mapper, Mapper::parse).with_context(wrong)?,
+            order: known("order", description.order, Order::parse)
                 .with_context(wrong)?
                 .map(Named),
         };
@@ -159,6 +151,17 @@ impl Golden {
             Err(error) => Err(error).with_context(wrong),
         }
     }
+}
+
+/// What a description names, if it names it.
+fn known<T>(
+    what: &str,
+    name: Option<String>,
+    parse: impl FnOnce(&str) -> Option<T>,
+) -> anyhow::Result<Option<T>> {
+    let Some(name) = name else { return Ok(None) };
+    let named = parse(&name).with_context(|| format!("there is no {what} '{name}'"))?;
+    Ok(Some(named))
 }
 
 /// What was found wrong with a golden.
