@@ -80,7 +80,7 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
         covered: vec![0; WIDTH * HEIGHT],
     };
     let mut seen = Vec::new();
-    stage.polygons(pose, |drawn| {
+    stage.polygons(pose, |_, drawn| {
         let drawn = drawn.expect("nothing legal is dropped");
         seen.push((drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });

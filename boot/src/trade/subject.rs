@@ -75,7 +75,7 @@ impl<'a> Subject<'a> {
         let mut pictures = Vec::new();
         for pose in poses {
             let mut faces = Vec::new();
-            stage.polygons(pose, |face| faces.extend(face.as_ref().map(Owned::new)));
+            stage.polygons(pose, |_, face| faces.extend(face.as_ref().map(Owned::new)));
             pictures.push(faces);
         }
         let stage: &'a Stage<'_> = stage;
@@ -138,6 +138,7 @@ fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
         vertices: &vertices,
         corners: &corners,
         faces: &faces,
+        convex: true,
     };
     let scene = Scene {
         name: RANDOM,

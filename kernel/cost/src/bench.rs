@@ -255,12 +255,12 @@ impl<'a, B: Bus> Bench<'a, B> {
                 }
             }),
             Work::FrameFaces => ticks(now, &mut || {
-                self.stage.polygons(&self.pose, |face| {
+                self.stage.polygons(&self.pose, |_, face| {
                     black_box(&face);
                 });
             }),
             Work::FrameJobs => ticks(now, &mut || {
-                self.stage.polygons(&self.pose, |face| {
+                self.stage.polygons(&self.pose, |_, face| {
                     let made = face.map(|face| {
                         mapper.jobs(&face, &self.ball, |job| {
                             black_box(&job);

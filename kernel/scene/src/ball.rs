@@ -36,6 +36,7 @@ pub const MESH: Mesh<'static> = Mesh {
     vertices: &BALL.vertices,
     corners: &BALL.corners,
     faces: &BALL.faces,
+    convex: true,
 };
 
 /// Paints the ball's texture, in full light.

@@ -223,6 +223,7 @@ const fn lies(vertices: &'static [Vec3]) -> Mesh<'static> {
         vertices,
         corners: &ONE_FACE,
         faces: &UPWARD,
+        convex: true,
     }
 }
 
@@ -256,6 +257,7 @@ const WALL: Mesh<'static> = Mesh {
     vertices: &WALL_VERTICES,
     corners: &ONE_FACE,
     faces: &TOWARDS,
+    convex: true,
 };
 
 /// Four vertices a side: front, right, back, left, top, bottom, each clockwise from its texture's
@@ -286,6 +288,7 @@ const CUBE: Mesh<'static> = Mesh {
     vertices: &CUBE_VERTICES,
     corners: &CUBE_CORNERS,
     faces: &CUBE_FACES,
+    convex: true,
 };
 
 #[cfg(test)]
@@ -385,7 +388,7 @@ mod tests {
         }
         staged("wall", |entry, stage| {
             for tick in TICKS {
-                stage.polygons(&entry.pose(tick), |face| {
+                stage.polygons(&entry.pose(tick), |_, face| {
                     let plane = face.unwrap().plane();
                     assert_eq!((plane.a.down, plane.c.down), (0, 0), "at {tick}");
                     assert_ne!(plane.c.right, 0, "at {tick}");

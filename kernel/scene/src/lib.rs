@@ -27,4 +27,4 @@ pub use camera::{FOCAL_LENGTH, NEAR};
 pub use colour::{LIGHT_LEVELS, LightTable};
 pub use mesh::{Corner, Face, MAX_CORNERS, MAX_EXTENT, Mesh, Vec3};
 pub use pose::{Orientation, Pose};
-pub use stage::{MAX_JOBS, MAX_VERTICES, SURFACE_BYTES, Scene, Stage, Storage};
+pub use stage::{MAX_FACES, MAX_JOBS, MAX_VERTICES, SURFACE_BYTES, Scene, Stage, Storage};

@@ -50,4 +50,7 @@ pub struct Mesh<'a> {
     pub corners: &'a [Corner],
     /// Faces.
     pub faces: &'a [Face],
+    /// Whether none of them can hide a part of another that looks at the viewer, as of a convex solid
+    /// and of a single face. What is not convex has at most [`MAX_FACES`](crate::MAX_FACES).
+    pub convex: bool,
 }

@@ -2,7 +2,7 @@
 
 use modex::{Destination, HEIGHT, Palette};
 use texmap::plane::Anchor;
-use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex};
+use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex, Visible};
 
 use crate::clip::{Point, place};
 use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
@@ -10,6 +10,8 @@ use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 
 /// Most vertices of a mesh.
 pub const MAX_VERTICES: usize = 1024;
+/// Most faces of a mesh that is not convex: each is known by a number until the picture is drawn.
+pub const MAX_FACES: usize = 2048;
 /// Column jobs that are collected before they are drawn.
 pub const MAX_JOBS: usize = 4096;
 /// Room for a scene's textures, each padded and once per light level: one of the largest.
@@ -41,15 +43,17 @@ pub struct Scene<'a, 't> {
 pub struct Storage {
     surfaces: [u8; SURFACE_BYTES],
     points: [Point; MAX_VERTICES],
+    visible: Visible<MAX_FACES>,
     jobs: JobList<MAX_JOBS>,
 }
 
 impl Storage {
-    /// Empty arenas. About 2 MiB: meant for a static.
+    /// Empty arenas. About 3 MiB: meant for a static.
     pub const fn new() -> Self {
         Self {
             surfaces: [0; SURFACE_BYTES],
             points: [Point::ORIGIN; MAX_VERTICES],
+            visible: Visible::new(),
             jobs: JobList::new(),
         }
     }
@@ -95,6 +99,7 @@ pub struct Stage<'a> {
     surfaces: [Surface; MAX_TEXTURES],
     texels: &'a mut [u8; SURFACE_BYTES],
     points: &'a mut [Point; MAX_VERTICES],
+    visible: &'a mut Visible<MAX_FACES>,
     jobs: &'a mut JobList<MAX_JOBS>,
 }
 
@@ -107,6 +112,7 @@ impl<'a> Stage<'a> {
         let Storage {
             surfaces,
             points,
+            visible,
             jobs,
         } = storage;
         let mut stage = Self {
@@ -119,6 +125,7 @@ impl<'a> Stage<'a> {
             surfaces: [Surface::default(); MAX_TEXTURES],
             texels: surfaces,
             points,
+            visible,
             jobs,
         };
         stage.set(scene);
@@ -128,7 +135,8 @@ impl<'a> Stage<'a> {
     /// Puts another scene on the stage, its textures lit.
     ///
     /// # Panics
-    /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or textures
+    /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or, if the mesh is
+    /// not convex, [`MAX_FACES`] faces, or textures
     /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together, each padded to powers of
     /// two. If a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further
     /// out than [`MAX_EXTENT`].
@@ -138,6 +146,11 @@ impl<'a> Stage<'a> {
             "the scene has {} vertices and {} textures; the arenas hold {MAX_VERTICES} and {MAX_TEXTURES}",
             scene.mesh.vertices.len(),
             scene.textures.len(),
+        );
+        let faces = scene.mesh.faces.len();
+        assert!(
+            scene.mesh.convex || faces <= MAX_FACES,
+            "a mesh that is not convex has {faces} faces; the arenas hold {MAX_FACES}",
         );
         for (i, face) in scene.mesh.faces.iter().enumerate() {
             assert!(
@@ -229,6 +242,9 @@ impl<'a> Stage<'a> {
     /// Draws the solid in `pose` on a destination that holds the background. At a distance outside
     /// 0 to [`Pose::MAX_DISTANCE`] every face is dropped; at any other none is.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
+        if !self.mesh.convex {
+            self.find_visible(pose);
+        }
         let (mapper, order) = (self.mapper, self.order);
         let mut surfaces = [Texture::DOT; MAX_TEXTURES * LIGHT_LEVELS];
         let lit = surfaces.chunks_exact_mut(LIGHT_LEVELS);
@@ -239,30 +255,47 @@ impl<'a> Stage<'a> {
                 }
             }
         }
+        let visible = &*self.visible;
         let mut renderer = Renderer::new(self.jobs, &surfaces, destination, mapper, order);
-        polygons(&self.mesh, self.points, pose, |face| match face {
+        polygons(&self.mesh, self.points, pose, |number, face| match face {
             None => renderer.drop_face(),
-            Some(face) => renderer.face(&face),
+            Some(face) if self.mesh.convex => renderer.face(&face),
+            Some(face) => renderer.seen_face(&face, visible, number),
         });
         renderer.finish()
     }
 
-    /// Gives `sink` what [`Stage::draw`] would draw, in its order; nothing for a face that is
-    /// dropped.
-    pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(Option<Face<'_>>)) {
+    /// Finds out which of the mesh's faces, of at most [`MAX_FACES`], is seen at each pixel.
+    pub fn find_visible(&mut self, pose: &Pose) -> &Visible<MAX_FACES> {
+        self.visible.clear();
+        polygons(&self.mesh, self.points, pose, |number, face| {
+            if let Some(face) = face {
+                // What is out of range here is so again for the mapper, which counts it.
+                let _ = self.visible.add(number, &face);
+            }
+        });
+        self.visible.finish();
+        self.visible
+    }
+
+    /// Gives `sink` the faces that look at the viewer, in the mesh's order, each with its number
+    /// there; nothing for a face that is dropped.
+    pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(u16, Option<Face<'_>>)) {
         polygons(&self.mesh, self.points, pose, sink);
     }
 }
 
-/// The faces that look at the viewer, in the mesh's order.
+/// The faces that look at the viewer, in the mesh's order, each with its number there.
 fn polygons(
     mesh: &Mesh<'_>,
     points: &mut [Point; MAX_VERTICES],
     pose: &Pose,
-    mut sink: impl FnMut(Option<Face<'_>>),
+    mut sink: impl FnMut(u16, Option<Face<'_>>),
 ) {
     if !(0..=Pose::MAX_DISTANCE).contains(&pose.distance) {
-        return mesh.faces.iter().for_each(|_| sink(None));
+        return (0..)
+            .zip(mesh.faces)
+            .for_each(|(number, _)| sink(number, None));
     }
     let orientation = pose.orientation();
     for (point, &vertex) in points.iter_mut().zip(mesh.vertices) {
@@ -270,10 +303,10 @@ fn polygons(
         *point = Point::new([x, y, z + pose.distance]);
     }
     let mut polygon = [Vertex::default(); MAX_SIDES];
-    for face in mesh.faces {
+    for (number, face) in (0..).zip(mesh.faces) {
         let corners = &mesh.corners[usize::from(face.first)..][..usize::from(face.corners)];
         let Some(sides) = place(corners, points, &mut polygon) else {
-            sink(None);
+            sink(number, None);
             continue;
         };
         let polygon = &polygon[..sides];
@@ -286,12 +319,13 @@ fn polygons(
                 u: corners[i].u,
                 v: corners[i].v,
             });
-            sink(Some(Face {
+            let face = Face {
                 polygon,
                 texture: surface as u16,
                 anchors,
                 focal_length: FOCAL_LENGTH,
-            }));
+            };
+            sink(number, Some(face));
         }
     }
 }

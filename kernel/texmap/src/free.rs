@@ -60,6 +60,16 @@ impl Walk {
         ((self.aside + self.slope * i32::from(i)) >> FRACTION) as i16
     }
 
+    /// The walk from pixel `i` on, whose row or column it counts from.
+    pub(crate) fn after(&self, i: u16) -> Self {
+        let aside = self.aside + self.slope * i32::from(i);
+        Self {
+            texture: self.texture.every(1, i.into()),
+            aside: aside & ((1 << FRACTION) - 1),
+            ..*self
+        }
+    }
+
     /// How many pixels from `i` on, of `len` in all, lie in the same row or column.
     pub(crate) fn straight(&self, i: u16, len: u16) -> u16 {
         let here = self.aside(i);

@@ -98,9 +98,41 @@ impl Job {
         }
     }
 
+    /// Whether the run keeps to one column.
+    pub(crate) fn is_column(&self) -> bool {
+        self.axis == Axis::Down && !matches!(self.walk, Walk::Free(_))
+    }
+
+    /// The `len` pixels of the run from pixel `first` on.
+    ///
+    /// Pieces begin anew at its first pixel. They are no longer than the whole run's, and lie within
+    /// it: no [bound](crate::bounds) is another one.
+    pub(crate) fn part(&self, first: u16, len: u16) -> Self {
+        let (x, y) = self.place(first);
+        let after = |mut walk: plane::Walk| {
+            walk.at = walk.after(first);
+            walk
+        };
+        let walk = match self.walk {
+            Walk::Affine(walk) => Walk::Affine(walk.every(1, first.into())),
+            Walk::Exact(walk) => Walk::Exact(after(walk)),
+            Walk::Linear(walk, pieces) => Walk::Linear(after(walk), pieces),
+            Walk::Quadratic(walk, pieces) => Walk::Quadratic(after(walk), pieces),
+            Walk::Wall(wall) => Walk::Wall(wall.after(first)),
+            Walk::Free(walk) => Walk::Free(walk.after(first)),
+        };
+        Self {
+            x,
+            y,
+            len,
+            walk,
+            ..*self
+        }
+    }
+
     /// Where pixel `i` of the run is.
     #[inline]
-    fn place(&self, i: u16) -> (u16, u16) {
+    pub(crate) fn place(&self, i: u16) -> (u16, u16) {
         let aside = match &self.walk {
             Walk::Free(walk) => walk.aside(i),
             _ => 0,

@@ -107,6 +107,14 @@ impl From<Wall> for affine::Walk {
 }
 
 impl Wall {
+    /// The walk from pixel `pixels` on.
+    pub(crate) fn after(self, pixels: u16) -> Self {
+        Self {
+            v: self.v + i32::from(pixels) * self.dv,
+            ..self
+        }
+    }
+
     /// Draws a column.
     pub(crate) fn column(self, texture: &Texture<'_>, column: Column<'_>) {
         let texels = &texture.texels()[(self.u >> 16) as usize..];

@@ -27,6 +27,7 @@ mod renderer;
 pub mod runs;
 mod straight;
 pub mod tiles;
+pub mod visible;
 pub mod within;
 
 pub use job::{Job, JobList, Rows, Style, Walk};
@@ -34,4 +35,5 @@ pub use mapper::{Face, Mapper};
 pub use plane::Plane;
 pub use polygon::{MAX_COORDINATE, MAX_SIDES, Point, SUBPIXELS, Texture, TextureError, Vertex};
 pub use renderer::{Order, Renderer, Stats};
+pub use visible::Visible;
 pub use within::Tolerance;

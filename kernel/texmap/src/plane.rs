@@ -119,7 +119,7 @@ impl Walk {
 }
 
 /// A form before it is cut: at pixel (0, 0), and the steps to the right and down.
-type Exact = [i128; 3];
+pub(crate) type Exact = [i128; 3];
 
 impl Plane {
     /// The plane through three points.
@@ -199,7 +199,7 @@ fn cross(a: [i128; 3], b: [i128; 3]) -> [i128; 3] {
 
 /// `vector . d` as a form. The centre of pixel (x, y) is at (x + 1/2, y + 1/2), and the middle of
 /// the screen is the corner between four pixels: twice d is whole.
-fn on_screen(vector: [i128; 3], focal_length: i32) -> Exact {
+pub(crate) fn on_screen(vector: [i128; 3], focal_length: i32) -> Exact {
     let [i, j, k] = vector;
     let (left, top) = (1 - WIDTH as i128, 1 - HEIGHT as i128);
     [

@@ -4,8 +4,9 @@ use core::fmt;
 
 use modex::Destination;
 
+use crate::coverage::{Dropped, check};
 use crate::mapper::{Face, Mapper};
-use crate::{JobList, Texture};
+use crate::{Job, JobList, Texture, Visible};
 
 /// What was drawn, and what was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -142,22 +143,45 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
     /// If there is no such texture.
     pub fn face(&mut self, face: &Face<'_>) {
         let texture = &self.textures[usize::from(face.texture)];
-        let mapped = self.mapper.jobs(face, texture, |job| {
-            self.stats.columns += 1;
-            self.stats.pixels += u32::from(job.len);
-            if let Err(job) = self.jobs.push(job) {
-                self.stats.full += 1;
-                draw(
-                    self.jobs,
-                    self.textures,
-                    self.destination,
-                    self.mapper,
-                    self.order,
-                );
-                // A list that was just emptied takes the job: N is not zero.
-                let _ = self.jobs.push(job);
-            }
-        });
+        let mapped = self.mapper.jobs(face, texture, |job| self.add(job));
+        self.count(mapped);
+    }
+
+    /// Adds a face as [`Renderer::face`] does, where `visible`, which knows it by `number`, says that
+    /// it is seen.
+    ///
+    /// # Panics
+    /// If there is no such texture.
+    pub fn seen_face<const FACES: usize>(
+        &mut self,
+        face: &Face<'_>,
+        visible: &Visible<FACES>,
+        number: u16,
+    ) {
+        let texture = &self.textures[usize::from(face.texture)];
+        let mapped = match visible.sees(number) {
+            true => self.mapper.jobs(face, texture, |job| {
+                visible.cut(number, &job, |part| self.add(part));
+            }),
+            // It needs no job, and whether it could have had any is told all the same.
+            false => check(face.polygon),
+        };
+        self.count(mapped);
+    }
+
+    /// Adds a job, to an empty list if it has to be.
+    fn add(&mut self, job: Job) {
+        self.stats.columns += 1;
+        self.stats.pixels += u32::from(job.len);
+        if let Err(job) = self.jobs.push(job) {
+            self.stats.full += 1;
+            self.draw();
+            // A list that was just emptied takes the job: N is not zero.
+            let _ = self.jobs.push(job);
+        }
+    }
+
+    fn count(&mut self, mapped: Result<(), Dropped>) {
         match mapped {
             Ok(()) => self.stats.polygons += 1,
             Err(_) => self.stats.dropped += 1,
@@ -170,27 +194,16 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
     }
 
     /// Draws what is left and says what the picture took.
-    pub fn finish(self) -> Stats {
-        draw(
-            self.jobs,
-            self.textures,
-            self.destination,
-            self.mapper,
-            self.order,
-        );
+    pub fn finish(mut self) -> Stats {
+        self.draw();
         self.stats
     }
-}
 
-/// Draws the jobs and empties the list.
-fn draw<D: Destination, const N: usize>(
-    jobs: &mut JobList<N>,
-    textures: &[Texture<'_>],
-    destination: &mut D,
-    mapper: Mapper,
-    order: Order,
-) {
-    const { assert!(N > 0, "a job list needs room for a job") };
-    order.draw(jobs, textures, destination, mapper);
-    jobs.clear();
+    /// Draws the jobs and empties the list.
+    fn draw(&mut self) {
+        const { assert!(N > 0, "a job list needs room for a job") };
+        self.order
+            .draw(self.jobs, self.textures, self.destination, self.mapper);
+        self.jobs.clear();
+    }
 }

@@ -12,6 +12,7 @@
 
 pub mod check;
 pub mod coverage;
+pub mod depth;
 pub mod mix;
 pub mod plane;
 pub mod shrink;

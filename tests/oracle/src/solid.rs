@@ -29,6 +29,7 @@ pub struct Solid {
     pub vertices: Vec<Vec3>,
     corners: Vec<Corner>,
     faces: Vec<Face>,
+    convex: bool,
 }
 
 impl Solid {
@@ -38,6 +39,7 @@ impl Solid {
             vertices: vertices.to_vec(),
             corners: Vec::new(),
             faces: Vec::new(),
+            convex: true,
         };
         for face in faces {
             solid.faces.push(Face {
@@ -95,6 +97,7 @@ impl Solid {
             vertices: mesh.vertices.to_vec(),
             corners: mesh.corners.to_vec(),
             faces: mesh.faces.to_vec(),
+            convex: true,
         };
         // Another texture: its places only have to be inside.
         for corner in &mut solid.corners {
@@ -132,6 +135,30 @@ impl Solid {
         self
     }
 
+    /// The same, taken for one whose faces may hide each other.
+    #[must_use]
+    pub fn concave(mut self) -> Self {
+        self.convex = false;
+        self
+    }
+
+    /// Both solids in one mesh, whose faces may hide each other.
+    #[must_use]
+    pub fn and(mut self, other: &Self) -> Self {
+        let (vertices, corners) = (self.vertices.len() as u16, self.corners.len() as u16);
+        self.vertices.extend(&other.vertices);
+        self.corners
+            .extend(other.corners.iter().map(|corner| Corner {
+                vertex: vertices + corner.vertex,
+                ..*corner
+            }));
+        self.faces.extend(other.faces.iter().map(|face| Face {
+            first: corners + face.first,
+            ..*face
+        }));
+        self.concave()
+    }
+
     /// Calls `act` with a stage on which the solid is.
     pub fn on_stage<T>(&self, storage: &mut Storage, act: impl FnOnce(&mut Stage<'_>) -> T) -> T {
         static LIGHT: LightTable = [[1; 256]; LIGHT_LEVELS];
@@ -145,6 +172,7 @@ impl Solid {
                 vertices: &self.vertices,
                 corners: &self.corners,
                 faces: &self.faces,
+                convex: self.convex,
             },
             textures: &textures,
             palette: &PALETTE,
@@ -191,6 +219,11 @@ impl Count {
         (count(|n| n == 0), count(|n| n > 1))
     }
 
+    /// How often pixel `i` was written, counted from the upper left along the rows.
+    pub fn times(&self, i: usize) -> u8 {
+        self.times[i]
+    }
+
     /// The first pixel whose number of times is wrong, with the number.
     fn first(&self, mut wrong: impl FnMut(usize, u8) -> bool) -> Option<(i32, i32, u8)> {
         let mut all = self.times.iter().enumerate();
@@ -200,8 +233,13 @@ impl Count {
 
     /// Draws a solid, nothing having been written before.
     pub fn draw(&mut self, storage: &mut Storage, solid: &Solid, pose: &Pose) -> Stats {
+        solid.on_stage(storage, |stage| self.redraw(stage, pose))
+    }
+
+    /// Draws what is on a stage, nothing having been written before.
+    pub fn redraw(&mut self, stage: &mut Stage<'_>, pose: &Pose) -> Stats {
         self.times.fill(0);
-        solid.on_stage(storage, |stage| stage.draw(pose, self))
+        stage.draw(pose, self)
     }
 }
 
@@ -215,9 +253,10 @@ impl Destination for Count {
         len: u16,
         draw: impl FnOnce(Lane<'_, STEP>),
     ) {
-        assert_eq!(STEP, STRIDE, "columns alone are drawn");
-        for row in y..y + len {
-            let times = &mut self.times[usize::from(row) * WIDTH + usize::from(x)];
+        for i in 0..usize::from(len) {
+            // A byte further is every fourth pixel of a row.
+            let along = i * STEP / STRIDE * WIDTH + i * STEP % STRIDE * 4;
+            let times = &mut self.times[usize::from(y) * WIDTH + usize::from(x) + along];
             *times = times.saturating_add(1);
         }
         self.page.lane(x, y, len, draw);
@@ -592,7 +631,7 @@ impl Checker {
         let mut drawn = Vec::new();
         let mut dropped = 0;
         solid.on_stage(&mut self.storage, |stage| {
-            stage.polygons(pose, |face| match face {
+            stage.polygons(pose, |_, face| match face {
                 Some(face) => drawn.push((
                     face.anchors.map(|anchor| anchor.position),
                     face.polygon
@@ -685,7 +724,7 @@ const ROUNDED: f64 = 2.0 * 1.733;
 fn is_in_fold(storage: &mut Storage, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
     let mut covering = Vec::new();
     solid.on_stage(storage, |stage| {
-        stage.polygons(pose, |drawn| {
+        stage.polygons(pose, |_, drawn| {
             let drawn = drawn.into_iter();
             covering.extend(drawn.filter_map(|drawn| {
                 let polygon: Vec<Point> = drawn.polygon.iter().map(|&v| v.into()).collect();
