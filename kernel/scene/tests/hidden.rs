@@ -27,7 +27,13 @@ fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
             "{name}: {pixels} pixels, {contested} of them covered more than once, {borders} borders \
              down the columns, {ties} ties within 2^-40"
         );
-        assert!(contested > 0, "{name} hides nothing");
+        // With so many poses some part of each is behind another.
+        assert!(contested > 0 || poses < 6, "{name} hides nothing");
+        let large = solid.extent() > 1 << 22;
+        assert!(
+            ties == 0 || large,
+            "{name}: nothing of it is cut to 45 bits"
+        );
     }
 }
 

@@ -135,6 +135,12 @@ impl Solid {
         self
     }
 
+    /// Its largest coordinate, either sign, 16.16.
+    pub fn extent(&self) -> i32 {
+        let coordinates = self.vertices.iter().flatten();
+        coordinates.map(|k| k.abs()).max().unwrap_or(0)
+    }
+
     /// The same, taken for one whose faces may hide each other.
     #[must_use]
     pub fn concave(mut self) -> Self {
