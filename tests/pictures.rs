@@ -6,6 +6,7 @@ use std::fmt;
 use crystal_ball::golden::{self, Golden};
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::coverage::inside;
+use oracle::depth;
 use oracle::solid::{self, Checker, Compared, Solid};
 use oracle::texel::{affine, perspective};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
@@ -28,7 +29,8 @@ fn pose(golden: &Golden) -> Pose {
     show::pose(scene(golden), *picture).expect("a golden's pose is legal")
 }
 
-/// What the definitions allow at each pixel: the colours, and how many polygons cover it.
+/// What the definitions allow at each pixel: the colours, and how many polygons cover it, of those
+/// that hide each other one.
 struct Expected {
     colours: Vec<Vec<u8>>,
     covered: Vec<u8>,
@@ -72,7 +74,7 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
 }
 
 fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
-    let background = stage.background();
+    let (background, convex) = (stage.background(), stage.is_convex());
     let mut expected = Expected {
         colours: (0..WIDTH * HEIGHT)
             .map(|i| vec![background[i / WIDTH]])
@@ -80,11 +82,12 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
         covered: vec![0; WIDTH * HEIGHT],
     };
     let mut seen = Vec::new();
-    stage.polygons(pose, |_, drawn| {
+    let nearest = depth::nearest(stage, pose);
+    stage.polygons(pose, |number, drawn| {
         let drawn = drawn.expect("nothing legal is dropped");
-        seen.push((drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
+        seen.push((number, drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });
-    for (polygon, surface, anchors) in seen {
+    for (number, polygon, surface, anchors) in seen {
         let texture = stage.surface(surface);
         let drawn = Face {
             polygon: &polygon,
@@ -105,8 +108,10 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
                     continue;
                 }
                 let i = y as usize * WIDTH + x as usize;
-                expected.covered[i] += 1;
-                expected.colours[i] = colours(&drawn, &texture, mapper, x, y);
+                expected.covered[i] += u8::from(convex || expected.covered[i] == 0);
+                if nearest[i][0] == number {
+                    expected.colours[i] = colours(&drawn, &texture, mapper, x, y);
+                }
             }
         }
     }

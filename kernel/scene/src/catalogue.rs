@@ -7,6 +7,7 @@ use texmap::Texture;
 
 use crate::ball::{self, TEXELS, paint_ball};
 use crate::colour::{BACKGROUND, LEVEL_BACKGROUND, LIGHT_TABLE, PALETTE};
+use crate::knot;
 use crate::surfaces::{self, SIDE};
 use crate::trig::sin;
 use crate::{Corner, Face, MAX_EXTENT, Mesh, Pose, Scene, Vec3};
@@ -58,7 +59,7 @@ impl Entry {
 }
 
 /// Every scene, the ball first.
-pub static CATALOGUE: [Entry; 7] = [
+pub static CATALOGUE: [Entry; 8] = [
     Entry {
         name: "ball",
         about: "the globe of flat facets: many small polygons, short runs",
@@ -147,6 +148,19 @@ pub static CATALOGUE: [Entry; 7] = [
             roll: turn(tick / 3),
             // 2.25 to 4.25 units: its corners are 1.73 from the middle.
             distance: units(13, 4) - (sin(turn(tick)) >> 14) as i32,
+        },
+    },
+    Entry {
+        name: "knot",
+        about: "a tube tied in a trefoil: parts of it hide others",
+        mesh: knot::MESH,
+        background: &BACKGROUND,
+        paint: knot::paint,
+        pose: |tick| Pose {
+            yaw: turn(tick).wrapping_mul(2).wrapping_neg(),
+            pitch: (70 * DEGREE).wrapping_add(turn(tick)),
+            roll: 20 * DEGREE,
+            distance: units(31, 10),
         },
     },
 ];

@@ -203,6 +203,11 @@ impl<'a> Stage<'a> {
         self.name
     }
 
+    /// Whether no face hides a part of another.
+    pub fn is_convex(&self) -> bool {
+        self.mesh.convex
+    }
+
     /// The DAC's colours.
     pub fn palette(&self) -> &'a Palette {
         self.palette

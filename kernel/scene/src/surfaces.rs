@@ -56,7 +56,7 @@ fn in_glyph(glyph: u8, x: i64, y: i64) -> bool {
 }
 
 /// A shade of a ramp, kept to what leaves the highlight room.
-fn shade(ramp: Ramp, shade: i64) -> u8 {
+pub fn shade(ramp: Ramp, shade: i64) -> u8 {
     ramp.shade(shade.clamp(1, 22) as usize)
 }
 

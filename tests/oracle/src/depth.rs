@@ -93,7 +93,7 @@ pub fn check(
     solid.on_stage(storage, |stage| {
         stage.set_mapper(mapper);
         stage.set_order(order);
-        let nearest = nearest(stage, pose);
+        let nearest = sorted(stage, pose);
         let visible = stage.find_visible(pose);
         let mut compared = Compared::default();
         let mut found = Vec::new();
@@ -137,8 +137,14 @@ pub fn check(
     })
 }
 
+/// The numbers of the faces that look at the viewer and cover each pixel, the nearest first.
+pub fn nearest(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<u16>> {
+    let numbers = |faces: Vec<(u16, Nearness)>| faces.into_iter().map(|face| face.0).collect();
+    sorted(stage, pose).into_iter().map(numbers).collect()
+}
+
 /// The faces that cover each pixel, the nearest first.
-fn nearest(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
+fn sorted(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
     let mut at = vec![Vec::new(); WIDTH * HEIGHT];
     let mut covered = Pixels::default();
     stage.polygons(pose, |number, face| {

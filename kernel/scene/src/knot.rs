@@ -1,0 +1,221 @@
+//! The knot: a tube along a trefoil, which hides parts of itself.
+//!
+//! The curve winds on a torus, twice around its axis while three times around its tube. There the
+//! torus's own normal is one direction across the curve, and the other lies in the torus: both are
+//! known without a derivative, and come back to themselves after the whole way, so that the rings of
+//! the tube close without a twist.
+
+use texmap::Texture;
+
+use crate::catalogue::MAX_TEXELS;
+use crate::colour::Ramp::{Azure, Gold, Indigo, Pearl, Rose, Teal, Violet};
+use crate::noise::fractal;
+use crate::surfaces::{self, SIDE, shade};
+use crate::trig::{cos, mul, sin};
+use crate::{Corner, Face, Mesh, Vec3};
+
+/// Rings along the curve, and corners of each.
+const RINGS: usize = 60;
+const SIDES: usize = 8;
+/// Rings that the texture goes along before it comes again: about as far as around the tube.
+const REPEAT: usize = 6;
+const VERTICES: usize = RINGS * SIDES;
+const FACES: usize = 2 * VERTICES;
+
+/// In hundredths of a unit: the torus's axis to its tube's middle, that to the curve, and the tube's
+/// radius.
+const REACH: i64 = 64;
+const WINDING: i64 = 29;
+const TUBE: i64 = 17;
+
+struct Solid {
+    vertices: [Vec3; VERTICES],
+    corners: [Corner; 3 * FACES],
+    faces: [Face; FACES],
+}
+
+/// Built by the compiler.
+static KNOT: Solid = build();
+
+/// The knot.
+pub const MESH: Mesh<'static> = Mesh {
+    vertices: &KNOT.vertices,
+    corners: &KNOT.corners,
+    faces: &KNOT.faces,
+    convex: false,
+};
+
+/// A place around the tube: the middle there and the direction outward, 30 fraction bits. `along`
+/// and `around` are fractions of the whole way.
+const fn place(along: u32, around: u32) -> ([i64; 3], [i64; 3]) {
+    let (phi, psi) = (along.wrapping_mul(2), along.wrapping_mul(3));
+    let (cos_phi, sin_phi) = (cos(phi), sin(phi));
+    let (cos_psi, sin_psi) = (cos(psi), sin(psi));
+    // From the torus's axis, and its normal: one direction across the curve.
+    let reach = (REACH << 30) / 100 + WINDING * cos_psi / 100;
+    let middle = [
+        mul(reach, cos_phi),
+        WINDING * sin_psi / 100,
+        mul(reach, sin_phi),
+    ];
+    let normal = [mul(cos_psi, cos_phi), sin_psi, mul(cos_psi, sin_phi)];
+    // The curve goes 2 reach along the axis's turn and 3 WINDING along the tube's.
+    let (turn, wind) = (2 * reach, 3 * (WINDING << 30) / 100);
+    // 2^31 (2^31.8 at most) and its square, below 2^63.
+    let length = ((turn * turn + wind * wind) as u64).isqrt() as i64;
+    let (turn, wind) = (
+        ((turn as i128) << 30) / length as i128,
+        ((wind as i128) << 30) / length as i128,
+    );
+    let (turn, wind) = (turn as i64, wind as i64);
+    // Across both: `turn` of the tube's direction, less `wind` of the axis's.
+    let across = [
+        mul(turn, -mul(sin_psi, cos_phi)) + mul(wind, sin_phi),
+        mul(turn, cos_psi),
+        mul(turn, -mul(sin_psi, sin_phi)) - mul(wind, cos_phi),
+    ];
+    let (c, s) = (cos(around), sin(around));
+    let mut out = [0; 3];
+    let mut k = 0;
+    while k < 3 {
+        out[k] = mul(c, normal[k]) + mul(s, across[k]);
+        k += 1;
+    }
+    (middle, out)
+}
+
+/// `i / n` of a turn.
+const fn turn(i: usize, n: usize) -> u32 {
+    (((i as u64) << 32) / n as u64) as u32
+}
+
+/// 30 fraction bits cut to `bits`, rounded.
+const fn round(v: [i64; 3], bits: u32) -> Vec3 {
+    let half = 1 << (29 - bits);
+    [
+        ((v[0] + half) >> (30 - bits)) as i32,
+        ((v[1] + half) >> (30 - bits)) as i32,
+        ((v[2] + half) >> (30 - bits)) as i32,
+    ]
+}
+
+/// The corner of ring `ring` and side `side`, its place in the texture counted from ring `from`.
+const fn corner(ring: usize, side: usize, from: usize) -> Corner {
+    Corner {
+        vertex: (ring % RINGS * SIDES + side % SIDES) as u16,
+        u: (((ring - from) * SIDE << 16) / REPEAT) as i32,
+        v: ((side * SIDE << 16) / SIDES) as i32,
+    }
+}
+
+const fn build() -> Solid {
+    let empty = Face {
+        first: 0,
+        corners: 3,
+        texture: 0,
+        normal: [0; 3],
+    };
+    let mut solid = Solid {
+        vertices: [[0; 3]; VERTICES],
+        corners: [corner(0, 0, 0); 3 * FACES],
+        faces: [empty; FACES],
+    };
+    let mut face = 0;
+    let mut ring = 0;
+    while ring < RINGS {
+        let from = ring / REPEAT * REPEAT;
+        let mut side = 0;
+        while side < SIDES {
+            let (mut point, out) = place(turn(ring, RINGS), turn(side, SIDES));
+            let mut k = 0;
+            while k < 3 {
+                point[k] += TUBE * out[k] / 100;
+                k += 1;
+            }
+            solid.vertices[ring * SIDES + side] = round(point, 16);
+            // Both halves of a facet have the tube's normal in its middle.
+            let (_, out) = place(turn(2 * ring + 1, 2 * RINGS), turn(2 * side + 1, 2 * SIDES));
+            let normal = round(out, 14);
+            let corners = [
+                corner(ring, side, from),
+                corner(ring + 1, side, from),
+                corner(ring + 1, side + 1, from),
+                corner(ring, side + 1, from),
+            ];
+            let mut half = 0;
+            while half < 2 {
+                solid.corners[3 * face] = corners[0];
+                solid.corners[3 * face + 1] = corners[1 + half];
+                solid.corners[3 * face + 2] = corners[2 + half];
+                solid.faces[face] = Face {
+                    first: 3 * face as u16,
+                    normal,
+                    ..empty
+                };
+                face += 1;
+                half += 1;
+            }
+            side += 1;
+        }
+        ring += 1;
+    }
+    assert!(face == FACES);
+    solid
+}
+
+/// Paints the tube's texture, whose opposite borders fit each other.
+pub fn paint(texels: &mut [u8; MAX_TEXELS]) -> Texture<'_> {
+    surfaces::paint(texels, ribbon)
+}
+
+/// A gold band around enamel, wound once about the tube, with pearls between two wires.
+fn ribbon(i: i64, j: i64) -> u8 {
+    const AROUND: i64 = SIDE as i64;
+    // Across the band, 0 to 255: it is wound once for each repeat.
+    let across = (i + j).rem_euclid(AROUND);
+    let from_band = (across - 128).abs();
+    let bevel = |middle: i64, wide: i64| 17 - (middle.abs() * 9 / wide) + (middle < 0) as i64 * 3;
+    match from_band {
+        0..18 => {
+            // Along the band, a pearl every 32 texels; the band goes along i - j.
+            let along = (i - j).rem_euclid(32) - 16;
+            let (x, y) = (along * 7 / 10, (across - 128) * 7 / 10);
+            let radius = x * x + y * y;
+            if radius < 64 {
+                let light = (x + 3).pow(2) + (y + 3).pow(2);
+                shade(Pearl, 22 - light / 8)
+            } else if radius < 90 {
+                Indigo.shade(2)
+            } else {
+                shade(Rose, 9 + (from_band / 4) % 2)
+            }
+        }
+        18..30 => shade(Gold, bevel(from_band - 24, 6)),
+        30..32 => Indigo.shade(2),
+        _ => {
+            // Enamel without a seam: noise on a torus of its own.
+            let angle = |k: i64| (k as u32).wrapping_mul(1 << 24);
+            let reach = (5i64 << 30) / 2 + cos(angle(j));
+            let on_torus = [
+                mul(reach, cos(angle(i))),
+                sin(angle(j)),
+                mul(reach, sin(angle(i))),
+            ];
+            let cloud = fractal(on_torus.map(|k| (k * 3) >> 15), 4, 91);
+            let hue = fractal(on_torus.map(|k| (k * 3) >> 16), 2, 33);
+            let ramp = match (hue * 4) >> 16 {
+                ..1 => Violet,
+                1 => Indigo,
+                2 => Azure,
+                _ => Teal,
+            };
+            let edge = (from_band - 32).min(10) - 10;
+            // A line of gold where the wires of the next winding would be.
+            match 128 - from_band {
+                ..3 => shade(Gold, 20 - (128 - from_band) * 4),
+                3..5 => Indigo.shade(2),
+                _ => shade(ramp, 5 + edge / 4 + ((cloud * 14) >> 16)),
+            }
+        }
+    }
+}
