@@ -747,7 +747,7 @@ impl<W: Write> Findings<'_, W> {
 }
 
 /// The names of the dumps and PNGs in a folder.
-fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
+pub(crate) fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
     let mut names = BTreeSet::new();
     for entry in fs::read_dir(folder)? {
         let name = entry?.file_name();

@@ -54,7 +54,7 @@ fn hex(text: &str) -> Result<u32, String> {
 }
 
 /// Reads `A..B` or `A..=B`.
-fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
+pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
     let parts = text.split_once("..");
     let (first, last) = parts.ok_or("two frame numbers are written A..B, or A..=B")?;
     let number = |text: &str| {

@@ -11,6 +11,8 @@ pub mod indexed;
 pub mod look;
 pub mod machine;
 pub mod measure;
+pub mod record;
+pub mod replay;
 pub mod report;
 pub mod screen;
 pub mod setup;

@@ -16,7 +16,7 @@ use crystal_ball::golden;
 use crystal_ball::look::Look;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::setup::{self, Options, Ready, say};
-use crystal_ball::{aside, child, trade};
+use crystal_ball::{aside, child, record, replay, trade};
 use show::Memory;
 
 /// How long the ball turns before its picture is taken without a display.
@@ -52,12 +52,26 @@ Examples (`cargo run -- ` hands on what follows):
   cargo run -- --mapper exact          with another mapper (--help lists them, -h does not)
   cargo run -- -- -machine q35 -m 64   with more arguments for QEMU
   cargo run -- doctor                  what is set up, and where
+  cargo run -- record --out ball.gif   a turn of the ball as a GIF
+  cargo run -- replay DIR              play a folder of dumps in the terminal
   cargo run -- diff A B                what differs in two dumps, PNGs or folders
   cargo run -- image --out ball.img    the disk image, for another emulator
   cargo run --release -- trade         what accuracy costs: tables, plots, pictures
 
 Exit codes: 0 done; 1 set-up failed; 2 wrong usage; 10 panic; 11 CPU exception; 12 triple fault;
 13 hang; 14 stopped in the boot loader; 15 QEMU failed; 16 serial line garbled; 130 ended by you.";
+
+const RECORD_HELP: &str = "\
+Examples:
+  cargo run -- record --out ball.gif                            a whole turn of the ball, 12 s
+  cargo run -- record --scene knot --every 6 --out knot.gif     ten pictures a second
+  cargo run -- record --frames 0..60 --every 1 --out pictures   every frame of a second, as PNGs";
+
+const REPLAY_HELP: &str = "\
+Examples:
+  cargo run -- replay dumps                      play a folder in the terminal
+  cargo run -- replay dumps --sheet sheet.png    all of it on one sheet
+  cargo run -- replay tests/golden --sheet goldens.png";
 
 #[derive(Debug, Args)]
 struct Boot {
@@ -91,6 +105,12 @@ enum Subcommands {
     Dump(Frames),
     /// Write the same files from the emulated card alone, without QEMU
     Emulate(Frames),
+    /// Record the show: every picture that is asked for, however slow the machine is
+    #[command(after_help = RECORD_HELP)]
+    Record(record::Options),
+    /// Look at many dumps or pictures at once: in the terminal, or as a contact sheet
+    #[command(after_help = REPLAY_HELP)]
+    Replay(replay::Options),
     /// Compare two dumps, two indexed PNGs, or two folders of them, and tell what differs
     ///
     /// Exit codes: 0 equal; 1 different; 2 could not compare.
@@ -203,6 +223,23 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             let mut memory = Box::new(Memory::new());
             frames.write(&mut Emulated::new(&mut memory)?, &cli.look, tell_path)?;
         }
+        Some(Subcommands::Record(recording)) => {
+            if let Err(error) = recording.check() {
+                say(format_args!("error: {error}"));
+                return Ok(ExitCode::from(2));
+            }
+            let ready = setup::ready(&options)?;
+            let mut machine = Machine::boot(&Config {
+                vga: cli.boot.vga,
+                arguments: cli.qemu_arguments,
+                ..Config::new(&ready)
+            })?;
+            let mut memory = Box::new(Memory::new());
+            let mut emulated = Emulated::new(&mut memory)?;
+            recording.record(&mut machine, &mut emulated, &cli.look, tell_path)?;
+            machine.leave()?;
+        }
+        Some(Subcommands::Replay(replay)) => replay.run(tell_path)?,
         Some(Subcommands::Diff { a, b, report }) => return compare(&a, &b, report.as_deref()),
         Some(Subcommands::Bless { folder }) => {
             let folder = folder.unwrap_or_else(golden::folder);

@@ -1,0 +1,296 @@
+//! `record`: pictures one after the other, as a GIF or as a folder of PNGs.
+//!
+//! The show is held and asked for each frame, so every frame is there however slow the machine is,
+//! and the same bytes come out each time. QEMU's card tells its checksums; where they are the
+//! emulated card's, its picture is taken, which has the same bytes, and where they are not the whole
+//! dump: ten times as much time on the line.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use gif::{DisposalMethod, Encoder, Frame, Repeat};
+use link::{Command, Content, Picture};
+
+use crate::card::{Card, Emulated};
+use crate::frames::range;
+use crate::indexed::{Indexed, widen};
+use crate::look::Look;
+use crate::machine::Machine;
+use crate::setup::Step;
+use crate::{aside, child};
+
+/// Which frames, and where to.
+#[derive(Args, Clone, Debug)]
+pub struct Options {
+    /// Frames A up to B, without B (with it: A..=B); a turn of the ball takes 720
+    #[arg(long, value_name = "A..B", value_parser = range, default_value = "0..720")]
+    frames: RangeInclusive<u32>,
+    /// Frames from one picture to the next; each stands for 1/60 s
+    #[arg(long, value_name = "N", default_value = "3",
+        value_parser = RangedU64ValueParser::<u32>::new().range(1..=600))]
+    every: u32,
+    /// A GIF, if the name ends in .gif, or else a folder for PNGs
+    #[arg(long, value_name = "FILE.gif|DIR")]
+    out: PathBuf,
+}
+
+/// Fewest 1/100 s that a picture of a GIF is shown: viewers take a shorter time for a tenth.
+const SHORTEST: u64 = 2;
+
+impl Options {
+    /// Whether the options make sense, before anything is set up.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn check(&self) -> anyhow::Result<()> {
+        match self.is_gif()? {
+            true if centiseconds(self.every.into()) < SHORTEST => bail!(
+                "--every {}: the pictures of a GIF are shown {SHORTEST}/100 s at least, two frames \
+                 are as long; a folder of PNGs takes each",
+                self.every
+            ),
+            _ => Ok(()),
+        }
+    }
+
+    fn is_gif(&self) -> anyhow::Result<bool> {
+        let ending = self
+            .out
+            .extension()
+            .map(|ending| ending.to_ascii_lowercase());
+        match ending {
+            Some(ending) if ending == "gif" => Ok(true),
+            Some(ending) if !self.out.is_dir() => bail!(
+                "{}: a recording is a GIF or a folder of PNGs, and no .{}",
+                self.out.display(),
+                ending.display()
+            ),
+            _ => Ok(false),
+        }
+    }
+
+    /// Records what `machine` shows, drawn as `look` says, beside `emulated`; `wrote` is told each
+    /// file's path.
+    ///
+    /// # Errors
+    /// When a card fails or a file can't be written. A GIF is whole or not there; so is each PNG.
+    pub fn record(
+        &self,
+        machine: &mut Machine,
+        emulated: &mut Emulated<'_>,
+        look: &Look,
+        mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
+    ) -> anyhow::Result<()> {
+        let frames = self.frames.clone().step_by(self.every as usize);
+        let what = format_args!("recording into {}", self.out.display());
+        let mut step = Step::counting(what, frames.clone().count() as u64);
+        machine.show_as(look, &[])?;
+        emulated.show_as(look, &[])?;
+        let mut pictures = (1..).zip(frames).map(|(done, frame)| {
+            if child::interrupted() {
+                return Err(child::Interrupted.into());
+            }
+            let picture = seen(machine, emulated, Picture::Frame(frame))?;
+            step.at(done);
+            Ok((frame, picture))
+        });
+        if self.is_gif()? {
+            aside::write(&self.out, |file| self.write_gif(file, pictures))?;
+            return Ok(wrote(&self.out)?);
+        }
+        std::fs::create_dir_all(&self.out)
+            .with_context(|| format!("{} cannot be made", self.out.display()))?;
+        pictures.try_for_each(|recorded| {
+            let (frame, picture) = recorded?;
+            let png = self.out.join(format!("frame-{frame:06}.png"));
+            aside::write(&png, |file| picture.write_png(file))?;
+            Ok(wrote(&png)?)
+        })
+    }
+
+    fn write_gif(
+        &self,
+        file: &mut File,
+        pictures: impl Iterator<Item = anyhow::Result<(u32, Indexed)>>,
+    ) -> anyhow::Result<()> {
+        let mut to = BufWriter::new(file);
+        let mut pictures = pictures.peekable();
+        let Some(Ok((_, first))) = pictures.peek() else {
+            // Of none, and of one that failed, there is nothing to write.
+            return pictures.next().map_or(Ok(()), |failed| failed.map(|_| ()));
+        };
+        let mut gif = encoder(&mut to, first)?;
+        let mut before = None;
+        for (i, recorded) in (0..).zip(pictures) {
+            let (_, picture) = recorded?;
+            // The times add up to those of the frames, whatever is lost of a single one.
+            let every = u64::from(self.every);
+            let delay = centiseconds((i + 1) * every) - centiseconds(i * every);
+            gif.write_frame(&Frame {
+                delay: delay as u16,
+                ..changed(before.as_ref(), &picture)?
+            })?;
+            before = Some(picture);
+        }
+        drop(gif);
+        Ok(to.flush()?)
+    }
+}
+
+/// So many ticks in 1/100 s, rounded down.
+fn centiseconds(ticks: u64) -> u64 {
+    ticks * 100 / 60
+}
+
+/// What QEMU's card holds when it shows `picture`.
+fn seen(
+    machine: &mut Machine,
+    emulated: &mut Emulated<'_>,
+    picture: Picture,
+) -> anyhow::Result<Indexed> {
+    emulated.ask(Command::Show(picture))?;
+    machine.ask(Command::Show(picture))?;
+    let dump = emulated.dump(Content::Page)?;
+    let sums = machine.ask(Command::Checksums(Content::Page))?;
+    Ok(match sums == dump.checksums() {
+        true => dump.picture(),
+        false => machine.dump(Content::Page)?.picture(),
+    })
+}
+
+/// A GIF that begins with `picture`, and goes round and round.
+fn encoder<W: Write>(to: W, picture: &Indexed) -> anyhow::Result<Encoder<W>> {
+    let colours: Vec<u8> = picture
+        .palette
+        .iter()
+        .flatten()
+        .map(|&part| widen(part))
+        .collect();
+    let (width, height) = (picture.width.try_into()?, picture.height.try_into()?);
+    let mut encoder = Encoder::new(to, width, height, &colours)?;
+    encoder.set_repeat(Repeat::Infinite)?;
+    Ok(encoder)
+}
+
+/// A GIF's frame: the rectangle in which `now` is another picture than `before`, what is the same
+/// in it see-through if a colour is left to say so.
+fn changed(before: Option<&Indexed>, now: &Indexed) -> anyhow::Result<Frame<'static>> {
+    let width = now.width;
+    let differs = |i: usize| before.is_none_or(|before| before.pixels[i] != now.pixels[i]);
+    let places = (0..now.pixels.len()).filter(|&i| differs(i));
+    // Of two pictures that are the same, the first pixel: a frame has one at least.
+    let (mut left, mut right, mut top, mut bottom) = (width, 1, now.height, 1);
+    for i in places {
+        let (x, y) = (i % width, i / width);
+        (left, right) = (left.min(x), right.max(x + 1));
+        (top, bottom) = (top.min(y), bottom.max(y + 1));
+    }
+    let (left, top) = (left.min(right - 1), top.min(bottom - 1));
+    let rows = (top..bottom).flat_map(|y| (left..right).map(move |x| y * width + x));
+    let mut used = [false; 256];
+    for i in rows.clone().filter(|&i| differs(i)) {
+        used[usize::from(now.pixels[i])] = true;
+    }
+    let free = used.iter().position(|used| !used).map(|free| free as u8);
+    let transparent = free.filter(|_| before.is_some());
+    let pixels = rows.map(|i| match transparent {
+        Some(same) if !differs(i) => same,
+        _ => now.pixels[i],
+    });
+    Ok(Frame {
+        left: left.try_into()?,
+        top: top.try_into()?,
+        width: (right - left).try_into()?,
+        height: (bottom - top).try_into()?,
+        dispose: DisposalMethod::Keep,
+        transparent,
+        buffer: pixels.collect(),
+        ..Frame::default()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(every: u32, out: &str) -> Options {
+        Options {
+            frames: 0..=1,
+            every,
+            out: out.into(),
+        }
+    }
+
+    #[test]
+    fn what_is_no_recording_is_told_before_anything_is_set_up() {
+        for (every, out) in [(2, "a.gif"), (600, "A.GIF"), (1, "folder"), (1, "/tmp")] {
+            options(every, out).check().unwrap();
+        }
+        for (every, out, why) in [
+            (1, "a.gif", "--every 1: the pictures of a GIF"),
+            (
+                3,
+                "a.mp4",
+                "a.mp4: a recording is a GIF or a folder of PNGs, and no .mp4",
+            ),
+        ] {
+            let error = options(every, out).check().unwrap_err().to_string();
+            assert!(error.starts_with(why), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_gif_is_the_pictures_and_lasts_as_long() {
+        let seed = fastrand::u64(..);
+        println!("seed {seed}");
+        let mut random = fastrand::Rng::with_seed(seed);
+        let palette: Vec<_> = (0..=255u8).map(|i| [i / 4, i % 64, i / 8]).collect();
+        let mut picture = Indexed {
+            width: 20,
+            height: 14,
+            palette,
+            pixels: vec![7; 280],
+        };
+        let mut pictures = vec![picture.clone(), picture.clone()];
+        for _ in 0..50 {
+            for _ in 0..random.usize(..30) {
+                picture.pixels[random.usize(..280)] = random.u8(..);
+            }
+            pictures.push(picture.clone());
+        }
+        // All 256 colours at once, everywhere else than before: none is left to see through.
+        picture.pixels = (0..280).map(|i| (i + i / 256) as u8).collect();
+        pictures.push(picture);
+        let mut file = tempfile::tempfile().unwrap();
+        let recorded = pictures.iter().cloned().map(|picture| Ok((0, picture)));
+        options(2, "a.gif").write_gif(&mut file, recorded).unwrap();
+
+        std::io::Seek::rewind(&mut file).unwrap();
+        let mut decoder = gif::DecodeOptions::new();
+        decoder.set_color_output(gif::ColorOutput::Indexed);
+        let mut decoder = decoder.read_info(file).unwrap();
+        assert_eq!(decoder.repeat(), Repeat::Infinite);
+        let mut shown = vec![0; 280];
+        let mut time = 0;
+        for picture in &pictures {
+            let frame = decoder.read_next_frame().unwrap().unwrap();
+            for (i, &pixel) in frame.buffer.iter().enumerate() {
+                let (x, y) = (i % usize::from(frame.width), i / usize::from(frame.width));
+                let place = (y + usize::from(frame.top)) * 20 + x + usize::from(frame.left);
+                if Some(pixel) != frame.transparent {
+                    shown[place] = pixel;
+                }
+            }
+            assert_eq!(shown, picture.pixels);
+            assert!((3..=4).contains(&frame.delay), "{}", frame.delay);
+            time += frame.delay;
+        }
+        assert!(decoder.read_next_frame().unwrap().is_none());
+        assert_eq!(u64::from(time), centiseconds(2 * pictures.len() as u64));
+    }
+}

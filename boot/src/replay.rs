@@ -1,0 +1,279 @@
+//! `replay`: a folder of dumps or pictures, played in the terminal or laid out on one sheet.
+
+use std::fmt::Write as _;
+use std::io::{IsTerminal, Write, stdout};
+use std::path::{Path, PathBuf};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, bail};
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use console::Term;
+
+use crate::diff::{Subject, list};
+use crate::indexed::{Indexed, widen};
+use crate::screen::Screen;
+use crate::setup::Step;
+use crate::{aside, child};
+
+/// Which pictures, and how they are shown.
+#[derive(Args, Clone, Debug)]
+pub struct Options {
+    /// Dumps and indexed PNGs, or folders of them; of a picture that is there as both the dump
+    #[arg(required = true)]
+    paths: Vec<PathBuf>,
+    /// All of them on one sheet in place of the terminal
+    #[arg(long, value_name = "FILE.png")]
+    sheet: Option<PathBuf>,
+    /// Pictures a second, in the terminal
+    #[arg(long, value_name = "N", default_value = "20",
+        value_parser = RangedU64ValueParser::<u32>::new().range(1..=60))]
+    rate: u32,
+}
+
+/// Widest that a sheet becomes, in pixels: pictures of many are made smaller.
+const SHEET_WIDTH: usize = 4096;
+/// Pixels between the pictures of a sheet.
+const GAP: usize = 4;
+
+impl Options {
+    /// Plays the pictures, or makes the sheet and tells `wrote` its path.
+    ///
+    /// # Errors
+    /// A file that is neither dump nor PNG, by name; no picture at all; standard output that is no
+    /// terminal, or can't be written.
+    pub fn run(&self, wrote: impl FnOnce(&Path) -> std::io::Result<()>) -> anyhow::Result<()> {
+        if self.sheet.is_none() && !stdout().is_terminal() {
+            bail!("standard output is no terminal to play in; --sheet FILE.png makes a sheet");
+        }
+        let files = self.files()?;
+        let mut pictures = Vec::new();
+        let mut step = Step::counting("reading", files.len() as u64);
+        for (done, file) in (1..).zip(&files) {
+            if child::interrupted() {
+                return Err(child::Interrupted.into());
+            }
+            pictures.push(Subject::read(file)?.picture().into_owned());
+            step.at(done);
+        }
+        drop(step);
+        match &self.sheet {
+            Some(sheet) => {
+                let laid_out = lay_out(&pictures);
+                aside::write(sheet, |file| {
+                    laid_out.write_png(std::io::BufWriter::new(file))
+                })?;
+                Ok(wrote(sheet)?)
+            }
+            None => self.play(&pictures),
+        }
+    }
+
+    /// All files, folders opened, each folder's in the order of their names.
+    fn files(&self) -> anyhow::Result<Vec<PathBuf>> {
+        let mut files = Vec::new();
+        for path in &self.paths {
+            if !path.is_dir() {
+                files.push(path.clone());
+                continue;
+            }
+            let names = list(path).with_context(|| format!("{} cannot be read", path.display()))?;
+            let pictures = names.iter().map(|name| path.join(name));
+            // A dump and a PNG of one name are one picture.
+            files.extend(pictures.filter(|file| {
+                let dump = file.with_extension("dump");
+                file == &dump || !names.contains(dump.file_name().unwrap_or_default())
+            }));
+        }
+        if files.is_empty() {
+            bail!("there is no dump and no PNG in what was named");
+        }
+        Ok(files)
+    }
+
+    fn play(&self, pictures: &[Indexed]) -> anyhow::Result<()> {
+        let screen = Alternate::enter()?;
+        let time = Duration::from_secs(1) / self.rate;
+        let mut due = Instant::now();
+        loop {
+            for (i, picture) in (1..).zip(pictures) {
+                let (rows, columns) = Term::stdout().size();
+                let mut text = in_blocks(picture, columns.into(), rows.saturating_sub(1).into());
+                let count = pictures.len();
+                let _ = write!(text, "{RESET}{ERASE}{i} of {count}; Ctrl-C ends it");
+                screen.write(&text)?;
+                due += time;
+                while Instant::now() < due {
+                    if child::interrupted() {
+                        return Ok(());
+                    }
+                    let left = due.saturating_duration_since(Instant::now());
+                    thread::sleep(left.min(Duration::from_millis(20)));
+                }
+            }
+        }
+    }
+}
+
+const HOME: &str = "\x1b[H";
+const RESET: &str = "\x1b[0m";
+const ERASE: &str = "\x1b[J";
+
+/// The terminal's other screen: what was on it comes back when this is dropped.
+struct Alternate;
+
+impl Alternate {
+    fn enter() -> anyhow::Result<Self> {
+        let this = Self;
+        this.write("\x1b[?1049h\x1b[?25l\x1b[2J")?;
+        Ok(this)
+    }
+
+    fn write(&self, text: &str) -> anyhow::Result<()> {
+        let mut out = stdout().lock();
+        let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
+        written.context("the terminal cannot be written")
+    }
+}
+
+impl Drop for Alternate {
+    fn drop(&mut self) {
+        // A terminal that is gone needs nothing back.
+        let _ = self.write("\x1b[?25h\x1b[?1049l");
+    }
+}
+
+/// A picture's colour at a place, 8 bits a part.
+fn colour(picture: &Indexed, x: usize, y: usize) -> [u8; 3] {
+    picture.palette[usize::from(picture.pixels[y * picture.width + x])].map(widen)
+}
+
+/// A picture made smaller to `width` x `height`, by the mean of what falls on each pixel.
+fn shrunk(picture: &Indexed, width: usize, height: usize) -> Screen {
+    let mut pixels = Vec::with_capacity(width * height);
+    for j in 0..height {
+        for i in 0..width {
+            let range = |at: usize, of: usize, all: usize| {
+                let first = at * all / of;
+                first..((at + 1) * all / of).max(first + 1)
+            };
+            let (xs, ys) = (
+                range(i, width, picture.width),
+                range(j, height, picture.height),
+            );
+            let count = (xs.len() * ys.len()) as u32;
+            let mut sum = [0u32; 3];
+            for y in ys {
+                for x in xs.clone() {
+                    for (sum, part) in sum.iter_mut().zip(colour(picture, x, y)) {
+                        *sum += u32::from(part);
+                    }
+                }
+            }
+            pixels.push(sum.map(|sum| ((sum + count / 2) / count) as u8));
+        }
+    }
+    Screen {
+        width,
+        height,
+        pixels,
+    }
+}
+
+/// A picture in half blocks, two pixels to a character, as large as fits.
+fn in_blocks(picture: &Indexed, columns: usize, rows: usize) -> String {
+    let (columns, rows) = (columns.max(1), rows.max(1));
+    // Pixels of the terminal are about square: a character is twice as high as wide.
+    let width = columns
+        .min(picture.width)
+        .min(2 * rows * picture.width / picture.height)
+        .max(1);
+    let height = (width * picture.height / picture.width).max(2) & !1;
+    let small = shrunk(picture, width, height);
+    let mut text = String::from(HOME);
+    for pair in small.pixels.chunks_exact(2 * width) {
+        let (upper, lower) = pair.split_at(width);
+        for ([r, g, b], [s, h, c]) in upper.iter().zip(lower) {
+            let _ = write!(text, "\x1b[38;2;{r};{g};{b};48;2;{s};{h};{c}m\u{2580}");
+        }
+        let _ = write!(text, "{RESET}\x1b[K\r\n");
+    }
+    text
+}
+
+/// All pictures on one sheet, row by row.
+fn lay_out(pictures: &[Indexed]) -> Screen {
+    let across = (1..).find(|n| n * n >= pictures.len()).unwrap_or(1);
+    let most = |of: fn(&Indexed) -> usize| pictures.iter().map(of).max().unwrap_or(1);
+    let (wide, high) = (most(|p| p.width), most(|p| p.height));
+    // As large as they are, if that fits.
+    let cell_width = wide.min((SHEET_WIDTH / across).saturating_sub(GAP)).max(1);
+    let cell_height = (high * cell_width / wide).max(1);
+    let down = pictures.len().div_ceil(across);
+    let mut sheet = Screen {
+        width: GAP + across * (cell_width + GAP),
+        height: GAP + down * (cell_height + GAP),
+        pixels: Vec::new(),
+    };
+    sheet.pixels = vec![[24; 3]; sheet.width * sheet.height];
+    for (i, picture) in pictures.iter().enumerate() {
+        let width = (picture.width * cell_width / wide).max(1);
+        let height = (picture.height * cell_width / wide).max(1);
+        let small = shrunk(picture, width, height);
+        let left = GAP + i % across * (cell_width + GAP);
+        let top = GAP + i / across * (cell_height + GAP);
+        for (y, row) in (top..).zip(small.pixels.chunks_exact(width)) {
+            sheet.pixels[y * sheet.width + left..][..width].copy_from_slice(row);
+        }
+    }
+    sheet
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Left half black, right half white.
+    fn halves(width: usize, height: usize) -> Indexed {
+        Indexed {
+            width,
+            height,
+            palette: vec![[0; 3], [63; 3]],
+            pixels: (0..width * height)
+                .map(|i| u8::from(i % width >= width / 2))
+                .collect(),
+        }
+    }
+
+    #[test]
+    fn a_smaller_picture_has_the_mean_of_what_it_leaves_out() {
+        let picture = halves(320, 240);
+        assert_eq!(shrunk(&picture, 320, 240).pixels[160], [255; 3]);
+        let third = shrunk(&picture, 3, 2).pixels;
+        assert_eq!([third[0][0], third[2][0]], [0, 255]);
+        assert!((120..=135).contains(&third[1][0]), "{third:?}");
+    }
+
+    #[test]
+    fn a_sheet_has_every_picture_in_its_place() {
+        let pictures = vec![halves(320, 240); 5];
+        let sheet = lay_out(&pictures);
+        assert_eq!((sheet.width, sheet.height), (3 * 324 + 4, 2 * 244 + 4));
+        let white = sheet.pixels.iter().filter(|&&pixel| pixel == [255; 3]);
+        assert_eq!(white.count(), 5 * 160 * 240);
+        let many = lay_out(&vec![halves(320, 240); 400]);
+        assert!(many.width <= SHEET_WIDTH + GAP, "{}", many.width);
+    }
+
+    #[test]
+    fn blocks_fit_the_terminal() {
+        for (columns, rows) in [(80, 24), (400, 100), (10, 200), (1, 1), (0, 0)] {
+            let text = in_blocks(&halves(320, 240), columns, rows);
+            let lines: Vec<_> = text.lines().collect();
+            assert!(lines.len() <= rows.max(1), "{columns} x {rows}");
+            let wide = lines.iter().map(|line| line.matches('\u{2580}').count());
+            assert!(wide.max() <= Some(columns.max(1)), "{columns} x {rows}");
+        }
+    }
+}
