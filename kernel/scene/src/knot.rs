@@ -103,8 +103,8 @@ const fn round(v: [i64; 3], bits: u32) -> Vec3 {
 const fn corner(ring: usize, side: usize, from: usize) -> Corner {
     Corner {
         vertex: (ring % RINGS * SIDES + side % SIDES) as u16,
-        u: (((ring - from) * SIDE << 16) / REPEAT) as i32,
-        v: ((side * SIDE << 16) / SIDES) as i32,
+        u: ((((ring - from) * SIDE) << 16) / REPEAT) as i32,
+        v: (((side * SIDE) << 16) / SIDES) as i32,
     }
 }
 
