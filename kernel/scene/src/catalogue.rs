@@ -1,8 +1,11 @@
 //! Every built-in scene by name: the ball, and the scenes that mappers are measured with.
 //!
 //! Each of the latter asks one question of a mapper. They share the ball's palette and light.
+//!
+//! A solid that is loaded is an [`Entry`] as well, and whoever shows scenes need not know which
+//! ones are built in.
 
-use modex::HEIGHT;
+use modex::{HEIGHT, Palette};
 use texmap::Texture;
 
 use crate::ball::{self, TEXELS, paint_ball};
@@ -10,44 +13,96 @@ use crate::colour::{BACKGROUND, LEVEL_BACKGROUND, LIGHT_TABLE, PALETTE};
 use crate::knot;
 use crate::surfaces::{self, SIDE};
 use crate::trig::sin;
-use crate::{Corner, Face, MAX_EXTENT, Mesh, Pose, Scene, Vec3};
+use crate::{Corner, Face, LightTable, MAX_EXTENT, Mesh, Pose, Scene, Vec3};
 
 /// Texels of the largest texture in the catalogue: the memory that [`Entry::paint`] is lent.
 pub const MAX_TEXELS: usize = SIDE * SIDE;
 const _: () = assert!(TEXELS <= MAX_TEXELS);
 
 /// A scene by name.
-#[derive(Debug)]
-pub struct Entry {
+#[derive(Clone, Copy, Debug)]
+pub struct Entry<'a> {
     /// Its name: small letters, digits and hyphens.
     pub name: &'static str,
     /// A line about it, for people.
     pub about: &'static str,
-    mesh: Mesh<'static>,
-    background: &'static [u8; HEIGHT],
-    paint: for<'m> fn(&'m mut [u8; MAX_TEXELS]) -> Texture<'m>,
+    mesh: Mesh<'a>,
+    colours: Colours<'a>,
+    background: &'a [u8; HEIGHT],
+    cover: Cover<'a>,
     pose: fn(u32) -> Pose,
 }
 
-impl Entry {
-    /// The scene of a name.
-    pub fn parse(name: &str) -> Option<&'static Self> {
-        CATALOGUE.iter().find(|entry| entry.name == name)
+/// The DAC's colours, and what they become in the light.
+#[derive(Clone, Copy, Debug)]
+pub struct Colours<'a> {
+    /// The DAC's colours.
+    pub palette: &'a Palette,
+    /// What a texel becomes at a light level.
+    pub light: &'a LightTable,
+}
+
+impl Colours<'static> {
+    /// Of all that is built in.
+    pub const BUILT_IN: Self = Self {
+        palette: &PALETTE,
+        light: &LIGHT_TABLE,
+    };
+}
+
+/// Where an entry's one texture comes from.
+#[derive(Clone, Copy, Debug)]
+enum Cover<'a> {
+    /// It is painted by code.
+    Painted(for<'m> fn(&'m mut [u8; MAX_TEXELS]) -> Texture<'m>),
+    /// It is there.
+    Loaded(Texture<'a>),
+}
+
+impl<'a> Entry<'a> {
+    /// The name of a solid that was loaded; no built-in scene has it.
+    pub const LOADED: &'static str = "model";
+
+    /// A solid that was loaded. It turns as the ball does.
+    pub fn loaded(
+        mesh: Mesh<'a>,
+        texture: Texture<'a>,
+        colours: Colours<'a>,
+        background: &'a [u8; HEIGHT],
+    ) -> Self {
+        Self {
+            name: Self::LOADED,
+            about: "the model that was loaded with the image",
+            mesh,
+            colours,
+            background,
+            cover: Cover::Loaded(texture),
+            pose: Pose::at_tick,
+        }
     }
 
-    /// Paints its one texture, in full light.
-    pub fn paint<'m>(&self, texels: &'m mut [u8; MAX_TEXELS]) -> Texture<'m> {
-        (self.paint)(texels)
+    /// Its one texture in full light; one that has to be painted is painted into `texels`.
+    pub fn paint<'m>(&self, texels: &'m mut [u8; MAX_TEXELS]) -> Texture<'m>
+    where
+        'a: 'm,
+    {
+        match self.cover {
+            Cover::Painted(paint) => paint(texels),
+            Cover::Loaded(texture) => texture,
+        }
     }
 
-    /// The scene. `textures` holds what [`Entry::paint`] painted.
-    pub fn scene<'t>(&self, textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
+    /// The scene. `textures` holds what [`Entry::paint`] gave.
+    pub fn scene<'t>(&self, textures: &'t [Texture<'t>]) -> Scene<'a, 't>
+    where
+        'a: 't,
+    {
         Scene {
             name: self.name,
             mesh: self.mesh,
             textures,
-            palette: &PALETTE,
-            light: &LIGHT_TABLE,
+            palette: self.colours.palette,
+            light: self.colours.light,
             background: self.background,
         }
     }
@@ -58,25 +113,34 @@ impl Entry {
     }
 }
 
-/// Every scene, the ball first.
-pub static CATALOGUE: [Entry; 8] = [
+impl Entry<'static> {
+    /// The built-in scene of a name.
+    pub fn parse(name: &str) -> Option<&'static Self> {
+        CATALOGUE.iter().find(|entry| entry.name == name)
+    }
+}
+
+/// Every built-in scene, the ball first.
+pub static CATALOGUE: [Entry<'static>; 8] = [
     Entry {
         name: "ball",
         about: "the globe of flat facets: many small polygons, short runs",
         mesh: ball::MESH,
+        colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        paint: |texels| {
+        cover: Cover::Painted(|texels| {
             let (texels, _) = texels.split_at_mut(TEXELS);
             paint_ball(texels.try_into().expect("it was cut to TEXELS"))
-        },
+        }),
         pose: Pose::at_tick,
     },
     Entry {
         name: "facing",
         about: "a square that faces the viewer and turns: no perspective at all",
         mesh: SQUARE,
+        colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        paint: |texels| surfaces::paint(texels, surfaces::dial),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::dial)),
         pose: |tick| Pose {
             yaw: turn(tick),
             pitch: QUARTER,
@@ -88,8 +152,9 @@ pub static CATALOGUE: [Entry; 8] = [
         name: "tilted",
         about: "the square at 45 degrees to the line of sight, turning in its plane",
         mesh: SQUARE,
+        colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        paint: |texels| surfaces::paint(texels, surfaces::board),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::board)),
         pose: |tick| Pose {
             yaw: turn(tick).wrapping_add(25 * DEGREE),
             pitch: QUARTER / 2,
@@ -101,8 +166,9 @@ pub static CATALOGUE: [Entry; 8] = [
         name: "grazing-16",
         about: "a floor to the horizon, sixteen times as far away there as at its near edge",
         mesh: FLOOR_16,
+        colours: Colours::BUILT_IN,
         background: &LEVEL_BACKGROUND,
-        paint: |texels| surfaces::paint(texels, surfaces::board),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::board)),
         pose: |tick| Pose {
             yaw: 0,
             pitch: 0,
@@ -114,8 +180,9 @@ pub static CATALOGUE: [Entry; 8] = [
         name: "grazing-4096",
         about: "a floor from under the eye to the horizon: 4096 times as far away there",
         mesh: FLOOR_4096,
+        colours: Colours::BUILT_IN,
         background: &LEVEL_BACKGROUND,
-        paint: |texels| surfaces::paint(texels, surfaces::plain),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::plain)),
         pose: |tick| Pose {
             yaw: 0,
             pitch: 0,
@@ -127,8 +194,9 @@ pub static CATALOGUE: [Entry; 8] = [
         name: "wall",
         about: "a wall that runs away from the viewer: constant depth down each column",
         mesh: WALL,
+        colours: Colours::BUILT_IN,
         background: &LEVEL_BACKGROUND,
-        paint: |texels| surfaces::paint(texels, surfaces::bricks),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::bricks)),
         pose: |tick| Pose {
             yaw: sway(tick, 12).wrapping_add(52 * DEGREE),
             pitch: 0,
@@ -140,8 +208,9 @@ pub static CATALOGUE: [Entry; 8] = [
         name: "cube",
         about: "a crate that tumbles and comes close to the eye",
         mesh: CUBE,
+        colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        paint: |texels| surfaces::paint(texels, surfaces::crate_side),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::crate_side)),
         pose: |tick| Pose {
             yaw: turn(tick).wrapping_add(35 * DEGREE),
             pitch: turn(tick / 2).wrapping_add(30 * DEGREE),
@@ -154,8 +223,9 @@ pub static CATALOGUE: [Entry; 8] = [
         name: "knot",
         about: "a tube tied in a trefoil: parts of it hide others",
         mesh: knot::MESH,
+        colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        paint: knot::paint,
+        cover: Cover::Painted(knot::paint),
         pose: |tick| Pose {
             yaw: turn(tick).wrapping_mul(2).wrapping_neg(),
             pitch: (70 * DEGREE).wrapping_add(turn(tick)),
@@ -320,7 +390,7 @@ mod tests {
     const TICKS: [u32; 9] = [0, 1, 89, 180, 271, 360, 447, 540, 719];
 
     /// Calls `check` with an entry and a stage of it.
-    fn staged(name: &str, check: impl FnOnce(&Entry, &mut Stage<'_>)) {
+    fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut Stage<'_>)) {
         let entry = Entry::parse(name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
         let textures = [entry.paint(&mut texels)];
@@ -329,7 +399,7 @@ mod tests {
     }
 
     /// Of each vertex of a mesh at a tick, how far away it is.
-    fn depths(entry: &Entry, tick: u32) -> Vec<i32> {
+    fn depths(entry: &Entry<'_>, tick: u32) -> Vec<i32> {
         let pose = entry.pose(tick);
         let orientation = pose.orientation();
         let depth = |&vertex| orientation.turn(vertex)[2] + pose.distance;
@@ -346,6 +416,7 @@ mod tests {
             assert_eq!(Entry::parse(entry.name).unwrap().name, entry.name);
         }
         assert!(Entry::parse("Ball").is_none());
+        assert!(!known.contains(Entry::LOADED));
     }
 
     #[test]

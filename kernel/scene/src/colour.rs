@@ -21,6 +21,8 @@
 //! It knows its scan line and nothing else: dusk over a sea. Between two neighbouring colours
 //! the lines alternate, so that no step of the 6-bit DAC is seen as an edge.
 
+use core::ops::Range;
+
 use modex::{HEIGHT, Palette, Rgb6};
 
 use crate::Vec3;
@@ -95,6 +97,8 @@ const ANCHORS: [[Rgb6; 5]; RAMPS] = [
 
 /// First colour of the sky, the zenith; its last is the horizon.
 const FIRST_SKY: usize = FIRST_SHADE + RAMPS * SHADES;
+/// The entries that neither a background nor writing has: where a loaded model puts its own colours.
+pub const MATERIALS: Range<usize> = FIRST_SHADE..FIRST_SKY;
 /// Colours of the sky: as many as its steepest stretch has steps of the DAC.
 const SKY: usize = 52;
 /// First colour of the sea, the deep; its last is the glitter below the horizon.
@@ -168,9 +172,9 @@ const fn blend(palette: &mut Palette, first: usize, count: usize, anchors: &[Rgb
 
 /// The level at which a texture has the colours it was painted in. Below it is dimmed; above it
 /// the highlight is added.
-const FULL_LIGHT: usize = 17;
+pub const FULL_LIGHT: usize = 17;
 /// Light from everywhere, in levels: what keeps the dark side from black.
-const AMBIENT: usize = 4;
+pub const AMBIENT: usize = 4;
 /// Half shades that a level of highlight adds: enamel half way to white, metal nearly to it.
 const SHINE: [usize; RAMPS] = [3, 3, 3, 3, 3, 4, 3];
 

@@ -9,7 +9,7 @@ use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
 use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 
 /// Most vertices of a mesh.
-pub const MAX_VERTICES: usize = 1024;
+pub const MAX_VERTICES: usize = 4096;
 /// Most faces of a mesh that is not convex: each is known by a number until the picture is drawn.
 pub const MAX_FACES: usize = 2048;
 /// Column jobs that are collected before they are drawn.
