@@ -1,0 +1,48 @@
+//! Where a pack's mesh is unpacked.
+
+use scene::{Corner, Face, MAX_VERTICES, Vec3};
+
+use crate::{MAX_ALL_CORNERS, MAX_FACES};
+
+/// Room for the largest mesh. About half a MiB: meant for a static.
+#[derive(Debug)]
+pub struct Arena {
+    pub(crate) vertices: [Vec3; MAX_VERTICES],
+    pub(crate) corners: [Corner; MAX_ALL_CORNERS],
+    pub(crate) faces: [Face; MAX_FACES],
+}
+
+impl Arena {
+    /// Empty, all of it zeros: in an image it takes no room.
+    pub const fn new() -> Self {
+        Self {
+            vertices: [[0; 3]; MAX_VERTICES],
+            corners: [Corner {
+                vertex: 0,
+                u: 0,
+                v: 0,
+            }; MAX_ALL_CORNERS],
+            faces: [Face {
+                first: 0,
+                corners: 0,
+                texture: 0,
+                normal: [0; 3],
+            }; MAX_FACES],
+        }
+    }
+}
+
+impl Default for Arena {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Puts items at the front of a place, and returns them there.
+pub(crate) fn fill<T>(place: &mut [T], items: impl ExactSizeIterator<Item = T>) -> &[T] {
+    let filled = &mut place[..items.len()];
+    for (to, item) in filled.iter_mut().zip(items) {
+        *to = item;
+    }
+    filled
+}

@@ -1,0 +1,576 @@
+//! Packs: a model as it is handed to the kernel, and to the emulated card's program.
+//!
+//! The host computes everything once: mesh, texels, palette and light table. Kernel and host then
+//! read the same bytes, so that they draw the same picture, and a pack's checksum says of what.
+//!
+//! # The format, version 1
+//!
+//! All numbers are little-endian, and nothing lies between two parts:
+//!
+//! | bytes | what |
+//! | --- | --- |
+//! | 8 | [`MAGIC`] |
+//! | 4 | [`VERSION`] |
+//! | 4 | length of the whole pack in bytes |
+//! | 4 | checksum: the CRC-32 (ISO-HDLC) of all bytes after it |
+//! | 2, 2, 2 | how many vertices V, corners C and faces F there are |
+//! | 2, 2 | the texture's width W and height H |
+//! | 256 x 3 | palette: the DAC's colours, red, green and blue, each 0 to 63 |
+//! | 24 x 256 | light table: for each level what each texel becomes, an entry of the palette |
+//! | 240 | background: for each scan line an entry of the palette |
+//! | W x H | texels, row by row from the top left |
+//! | V x 12 | vertices: x right, y down, z away from the viewer, signed, 16.16 |
+//! | C x 10 | corners of all faces: 2 which vertex, 4 u and 4 v in the texture, 16.16 texels |
+//! | F x 8 | faces: 2 how many of the corners, which follow those of the face before; three times 2 the outward unit normal, signed, 14 fraction bits |
+//!
+//! A texel is not a colour: the light table makes one of it. So texels and palette may be reduced
+//! each by itself.
+//!
+//! # What is checked
+//!
+//! [`Pack::parse`] takes nothing on trust, for the bytes may come from anywhere. With its checksum
+//! any change by accident is found. But one can be made on purpose that fits, so every count,
+//! index and range is checked by itself: a scene made of an accepted pack is within every limit
+//! that [`scene::Stage`] and the mappers have, and can make none of them panic. Whether it is
+//! beautiful is not checked: faces may be bent, inside out or nowhere.
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod arena;
+mod error;
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use modex::{HEIGHT, Palette};
+use scene::catalogue::{Colours, Entry};
+use scene::{Corner, Face, LIGHT_LEVELS, LightTable, MAX_CORNERS, MAX_EXTENT, MAX_VERTICES, Mesh};
+use texmap::Texture;
+
+pub use arena::Arena;
+pub use error::PackError;
+
+/// How a pack begins.
+pub const MAGIC: [u8; 8] = *b"CBALPACK";
+/// Version of the format.
+pub const VERSION: u32 = 1;
+/// Most faces of a pack.
+pub const MAX_FACES: usize = 8192;
+/// Most corners of all its faces: those of as many triangles.
+pub const MAX_ALL_CORNERS: usize = 3 * MAX_FACES;
+/// Longest pack in bytes.
+pub const MAX_BYTES: usize = 512 * 1024;
+
+/// Magic, version, length and checksum: what comes before the bytes that are summed.
+const SUMMED: usize = 20;
+/// All that comes before the palette.
+const HEADER: usize = SUMMED + 10;
+const PALETTE: usize = 256 * 3;
+const LIGHT: usize = LIGHT_LEVELS * 256;
+const VERTEX: usize = 12;
+const CORNER: usize = 10;
+const FACE: usize = 8;
+
+// The counts' limits keep within that of the bytes.
+const _: () = assert!(
+    HEADER
+        + PALETTE
+        + LIGHT
+        + HEIGHT
+        + Texture::MAX_SIDE as usize * Texture::MAX_SIDE as usize
+        + MAX_VERTICES * VERTEX
+        + MAX_ALL_CORNERS * CORNER
+        + MAX_FACES * FACE
+        <= MAX_BYTES
+);
+
+/// Furthest that the square of a normal's length may be from 2^28, that of a unit vector: each
+/// part may be rounded up or down by a whole unit. The light takes a power of it that longer
+/// ones would carry out of 64 bits.
+const NORMAL_SLACK: i64 = 1 << 16;
+
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// What a pack is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Parts<'a> {
+    /// The solid.
+    pub mesh: Mesh<'a>,
+    /// What covers it.
+    pub texture: Texture<'a>,
+    /// Palette and light table.
+    pub colours: Colours<'a>,
+    /// The colour of each scan line where there is no solid.
+    pub background: &'a [u8; HEIGHT],
+}
+
+impl Parts<'_> {
+    /// The pack's bytes, given to `sink` in pieces, in their order, from the palette on.
+    fn body(&self, sink: &mut impl FnMut(&[u8])) {
+        sink(self.colours.palette.as_flattened());
+        sink(self.colours.light.as_flattened());
+        sink(self.background);
+        let rows = self.texture.texels().chunks(self.texture.pitch().into());
+        for row in rows.take(self.texture.height().into()) {
+            sink(&row[..self.texture.width().into()]);
+        }
+        for vertex in self.mesh.vertices {
+            vertex.iter().for_each(|k| sink(&k.to_le_bytes()));
+        }
+        for corner in self.mesh.corners {
+            sink(&corner.vertex.to_le_bytes());
+            sink(&corner.u.to_le_bytes());
+            sink(&corner.v.to_le_bytes());
+        }
+        for face in self.mesh.faces {
+            sink(&face.corners.to_le_bytes());
+            let normal = face.normal.map(|k| k as i16);
+            normal.iter().for_each(|k| sink(&k.to_le_bytes()));
+        }
+    }
+
+    /// Writes the pack, in pieces; returns its checksum. What is beyond a limit is written as it
+    /// is, and [`Pack::parse`] refuses it. Faces take the corners one after the other, and all of
+    /// them the one texture, whatever `first` and `texture` say.
+    pub fn write(&self, mut sink: impl FnMut(&[u8])) -> u32 {
+        let Mesh {
+            vertices,
+            corners,
+            faces,
+        } = self.mesh;
+        let counts = [vertices.len(), corners.len(), faces.len()];
+        let sides = [self.texture.width(), self.texture.height()];
+        let mut numbers = [0; HEADER - SUMMED];
+        let values = counts.map(|count| count as u16).into_iter().chain(sides);
+        for (place, value) in numbers.chunks_exact_mut(2).zip(values) {
+            place.copy_from_slice(&value.to_le_bytes());
+        }
+        let mut digest = CRC.digest();
+        let mut length = HEADER;
+        digest.update(&numbers);
+        self.body(&mut |bytes| {
+            digest.update(bytes);
+            length += bytes.len();
+        });
+        let checksum = digest.finalize();
+        sink(&MAGIC);
+        for number in [VERSION, length as u32, checksum] {
+            sink(&number.to_le_bytes());
+        }
+        sink(&numbers);
+        self.body(&mut sink);
+        checksum
+    }
+}
+
+/// A pack that was found whole and within all limits. It borrows the bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct Pack<'p> {
+    checksum: u32,
+    colours: Colours<'p>,
+    background: &'p [u8; HEIGHT],
+    texture: Texture<'p>,
+    vertices: &'p [[u8; VERTEX]],
+    corners: &'p [[u8; CORNER]],
+    faces: &'p [[u8; FACE]],
+}
+
+/// Takes parts off the front of bytes.
+struct Reader<'p> {
+    rest: &'p [u8],
+}
+
+impl<'p> Reader<'p> {
+    /// The next `len` bytes. They are there: the length was compared with the sum of all parts.
+    fn take(&mut self, len: usize) -> &'p [u8] {
+        let (part, rest) = self.rest.split_at(len);
+        self.rest = rest;
+        part
+    }
+
+    /// The next `count` records of N bytes.
+    fn records<const N: usize>(&mut self, count: usize) -> &'p [[u8; N]] {
+        let (records, _) = self.take(count * N).as_chunks();
+        records
+    }
+}
+
+impl<'p> Pack<'p> {
+    /// Reads a pack, and checks all of it.
+    ///
+    /// # Errors
+    /// The first thing that is not as it must be.
+    pub fn parse(bytes: &'p [u8]) -> Result<Self, PackError> {
+        if bytes.len() > MAX_BYTES {
+            return Err(PackError::TooLong(bytes.len()));
+        }
+        // Of something else altogether, say that it is no pack, and not that it is short.
+        if !bytes.starts_with(&MAGIC) {
+            return Err(PackError::NoPack);
+        }
+        let (header, _) = bytes
+            .split_first_chunk::<HEADER>()
+            .ok_or(PackError::Short(bytes.len()))?;
+        let word = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
+        let long = |at: usize| u32::from(word(at)) | u32::from(word(at + 2)) << 16;
+        // The length and the checksum may have other places in another version.
+        let version = long(8);
+        if version != VERSION {
+            return Err(PackError::Version(version));
+        }
+        let said = long(12);
+        if said as usize != bytes.len() {
+            let actual = bytes.len();
+            return Err(PackError::Length { said, actual });
+        }
+        let (said, computed) = (long(16), CRC.checksum(&bytes[SUMMED..]));
+        if said != computed {
+            return Err(PackError::Checksum { said, computed });
+        }
+        let [vertices, corners, faces] = [20, 22, 24].map(|at| usize::from(word(at)));
+        let (width, height) = (word(26), word(28));
+        for (what, count, most) in [
+            ("vertices", vertices, MAX_VERTICES),
+            ("corners", corners, MAX_ALL_CORNERS),
+            ("faces", faces, MAX_FACES),
+        ] {
+            if count > most {
+                return Err(PackError::TooMany { what, count, most });
+            }
+        }
+        let texels = usize::from(width) * usize::from(height);
+        let fixed = HEADER + PALETTE + LIGHT + HEIGHT;
+        let parts = fixed + texels + vertices * VERTEX + corners * CORNER + faces * FACE;
+        if parts != bytes.len() {
+            let actual = bytes.len();
+            return Err(PackError::Parts { parts, actual });
+        }
+
+        let mut reader = Reader {
+            rest: &bytes[HEADER..],
+        };
+        let palette: &Palette = whole(reader.records(256));
+        let light: &LightTable = whole(reader.records(LIGHT_LEVELS));
+        let background = whole(reader.take(HEIGHT));
+        let texture = Texture::new(reader.take(texels), width, height)?;
+        let pack = Self {
+            checksum: said,
+            colours: Colours { palette, light },
+            background,
+            texture,
+            vertices: reader.records(vertices),
+            corners: reader.records(corners),
+            faces: reader.records(faces),
+        };
+        pack.check()?;
+        Ok(pack)
+    }
+
+    /// Checks every value against its range.
+    fn check(&self) -> Result<(), PackError> {
+        let beyond_dac = |colour: &[u8; 3]| colour.iter().any(|&part| part > 63);
+        if let Some(entry) = self.colours.palette.iter().position(beyond_dac) {
+            return Err(PackError::Colour(entry));
+        }
+        let extent = -MAX_EXTENT..=MAX_EXTENT;
+        for (i, vertex) in self.vertices.iter().map(vertex).enumerate() {
+            if !vertex.iter().all(|k| extent.contains(k)) {
+                return Err(PackError::Vertex(i));
+            }
+        }
+        let width = i32::from(self.texture.width()) << 16;
+        let height = i32::from(self.texture.height()) << 16;
+        for (i, corner) in self.corners.iter().map(corner).enumerate() {
+            if usize::from(corner.vertex) >= self.vertices.len() {
+                return Err(PackError::CornerVertex(i));
+            }
+            if !(0..=width).contains(&corner.u) || !(0..=height).contains(&corner.v) {
+                return Err(PackError::CornerPlace(i));
+            }
+        }
+        let mut first = 0;
+        for (i, face) in self.faces.iter().enumerate() {
+            let face = face_at(face, first);
+            if !(3..=MAX_CORNERS).contains(&face.corners.into()) {
+                return Err(PackError::FaceCorners(i));
+            }
+            let length: i64 = face.normal.iter().map(|&k| i64::from(k).pow(2)).sum();
+            if (length - (1 << 28)).abs() > NORMAL_SLACK {
+                return Err(PackError::FaceNormal(i));
+            }
+            // At most MAX_FACES MAX_CORNERS.
+            first += usize::from(face.corners);
+        }
+        if first != self.corners.len() {
+            return Err(PackError::Shared {
+                used: first,
+                there: self.corners.len(),
+            });
+        }
+        Ok(())
+    }
+
+    /// The checksum in its header: what tells one pack from another.
+    pub fn checksum(&self) -> u32 {
+        self.checksum
+    }
+
+    /// Its scene, the mesh unpacked into `arena`.
+    pub fn entry<'a>(&self, arena: &'a mut Arena) -> Entry<'a>
+    where
+        'p: 'a,
+    {
+        let Arena {
+            vertices,
+            corners,
+            faces,
+        } = arena;
+        let mut first = 0;
+        let faces_of = self.faces.iter().map(|bytes| {
+            let face = face_at(bytes, first);
+            first += usize::from(face.corners);
+            face
+        });
+        let mesh = Mesh {
+            vertices: arena::fill(vertices, self.vertices.iter().map(vertex)),
+            corners: arena::fill(corners, self.corners.iter().map(corner)),
+            faces: arena::fill(faces, faces_of),
+        };
+        Entry::loaded(mesh, self.texture, self.colours, self.background)
+    }
+}
+
+/// A part of a fixed size.
+fn whole<T, const N: usize>(part: &[T]) -> &[T; N] {
+    part.try_into().expect("it was cut to this size")
+}
+
+fn vertex(bytes: &[u8; VERTEX]) -> [i32; 3] {
+    let (parts, _) = bytes.as_chunks();
+    [0, 1, 2].map(|k| i32::from_le_bytes(parts[k]))
+}
+
+fn corner(bytes: &[u8; CORNER]) -> Corner {
+    let [a, b, place @ ..] = *bytes;
+    let (parts, _) = place.as_chunks();
+    Corner {
+        vertex: u16::from_le_bytes([a, b]),
+        u: i32::from_le_bytes(parts[0]),
+        v: i32::from_le_bytes(parts[1]),
+    }
+}
+
+/// A face whose first corner is `first`, at most [`MAX_ALL_CORNERS`] in an accepted pack.
+fn face_at(bytes: &[u8; FACE], first: usize) -> Face {
+    let (words, _) = bytes.as_chunks();
+    Face {
+        first: first as u16,
+        corners: u16::from_le_bytes(words[0]),
+        texture: 0,
+        normal: [1, 2, 3].map(|k| i16::from_le_bytes(words[k]).into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use modex::PlanarBuffer;
+    use scene::{Pose, Stage, Storage};
+    use std::boxed::Box;
+    use std::string::ToString;
+    use std::vec::Vec;
+
+    const SIDES: (u16, u16) = (7, 5);
+
+    /// The cube of the catalogue with a small texture.
+    fn cube() -> Vec<u8> {
+        let cube = Entry::parse("cube").unwrap().scene(&[]);
+        let mut corners = cube.mesh.corners.to_vec();
+        for corner in &mut corners {
+            let most = |on: i32, side: u16| if on > 0 { i32::from(side) << 16 } else { 0 };
+            (corner.u, corner.v) = (most(corner.u, SIDES.0), most(corner.v, SIDES.1));
+        }
+        let texels: Vec<u8> = (0..SIDES.0 * SIDES.1).map(|i| 100 + i as u8).collect();
+        let parts = Parts {
+            mesh: Mesh {
+                corners: &corners,
+                ..cube.mesh
+            },
+            texture: Texture::new(&texels, SIDES.0, SIDES.1).unwrap(),
+            colours: Colours {
+                palette: cube.palette,
+                light: cube.light,
+            },
+            background: cube.background,
+        };
+        let mut bytes = Vec::new();
+        let checksum = parts.write(|part| bytes.extend_from_slice(part));
+        assert_eq!(Pack::parse(&bytes).unwrap().checksum(), checksum);
+        bytes
+    }
+
+    /// A change to a pack that is made to fit its length and checksum.
+    fn forged(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
+        let mut bytes = cube();
+        change(&mut bytes);
+        let length = (bytes.len() as u32).to_le_bytes();
+        bytes[12..16].copy_from_slice(&length);
+        let checksum = CRC.checksum(&bytes[SUMMED..]).to_le_bytes();
+        bytes[16..20].copy_from_slice(&checksum);
+        bytes
+    }
+
+    #[test]
+    fn a_scene_comes_back() {
+        let bytes = cube();
+        let pack = Pack::parse(&bytes).unwrap();
+        let mut arena = Box::new(Arena::new());
+        let entry = pack.entry(&mut arena);
+        let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
+        let textures = [entry.paint(&mut painted)];
+        let (scene, cube) = (
+            entry.scene(&textures),
+            Entry::parse("cube").unwrap().scene(&[]),
+        );
+        assert_eq!(scene.name, Entry::LOADED);
+        assert_eq!(scene.mesh.vertices, cube.mesh.vertices);
+        assert_eq!(scene.mesh.faces, cube.mesh.faces);
+        assert_eq!(scene.mesh.corners.len(), cube.mesh.corners.len());
+        for (corner, before) in scene.mesh.corners.iter().zip(cube.mesh.corners) {
+            assert_eq!(corner.vertex, before.vertex);
+            assert_eq!(corner.u > 0, before.u > 0);
+        }
+        assert_eq!((scene.palette, scene.light), (cube.palette, cube.light));
+        assert_eq!(scene.background, cube.background);
+        assert_eq!((textures[0].width(), textures[0].height()), SIDES);
+        assert!((100..135).eq(textures[0].texels().iter().copied()));
+    }
+
+    #[test]
+    fn any_changed_byte_is_found() {
+        let good = cube();
+        for at in 0..good.len() {
+            let mut bytes = good.clone();
+            bytes[at] ^= 1 << (at % 8);
+            assert!(Pack::parse(&bytes).is_err(), "byte {at}");
+        }
+        for len in 0..good.len() {
+            assert!(Pack::parse(&good[..len]).is_err(), "{len} bytes");
+        }
+    }
+
+    #[test]
+    fn what_is_out_of_range_is_named_though_the_checksum_fits() {
+        const FIXED: usize = HEADER + PALETTE + LIGHT + HEIGHT;
+        const VERTICES: usize = FIXED + (SIDES.0 * SIDES.1) as usize;
+        const CORNERS: usize = VERTICES + 24 * VERTEX;
+        const FACES: usize = CORNERS + 24 * CORNER;
+        let put = |at: usize, new: &'static [u8]| {
+            forged(|bytes| bytes[at..at + new.len()].copy_from_slice(new))
+        };
+        for (bytes, why) in [
+            (put(0, b"c"), "does not begin as a pack"),
+            (Vec::new(), "does not begin as a pack"),
+            (MAGIC.to_vec(), "8 bytes are too few"),
+            (put(8, &[2]), "of version 2; this program reads version 1"),
+            (std::vec![0; MAX_BYTES + 1], "has at most 524288"),
+            (put(20, &[1, 16]), "4097 vertices; there is room for 4096"),
+            (put(22, &[1, 96]), "24577 corners; there is room for 24576"),
+            (put(24, &[1, 32]), "8193 faces; there is room for 8192"),
+            (put(24, &[7]), "what its header counts takes"),
+            (
+                forged(|bytes| bytes.push(0)),
+                "what its header counts takes",
+            ),
+            (put(26, &[0, 0]), "what its header counts takes"),
+            (
+                forged(|bytes| {
+                    bytes[26] = 0;
+                    bytes.drain(FIXED..VERTICES);
+                }),
+                "a texture of 0 x 5 texels",
+            ),
+            (put(HEADER + 5, &[64]), "colour 1 has a part above 63"),
+            (put(VERTICES + 15, &[0x7F]), "vertex 1 is outside"),
+            (put(VERTICES + 15, &[0x80]), "vertex 1 is outside"),
+            (put(CORNERS, &[24]), "corner 0 is at a vertex"),
+            (
+                put(CORNERS + 15, &[0xFF]),
+                "corner 1 is outside of the texture",
+            ),
+            (
+                put(CORNERS + 14, &[8]),
+                "corner 1 is outside of the texture",
+            ),
+            (put(FACES, &[2]), "face 0 has fewer than 3"),
+            (
+                put(FACES + 8, &[12]),
+                "face 1 has fewer than 3 or more than 11",
+            ),
+            (put(FACES + 2, &[0, 64]), "the normal of face 0"),
+            (put(FACES + 6, &[0, 0]), "the normal of face 0"),
+            (put(FACES, &[5]), "its faces take 25 corners, and it has 24"),
+        ] {
+            let error = Pack::parse(&bytes).unwrap_err().to_string();
+            assert!(error.contains(why), "{error}, and not {why}");
+        }
+        let mut long = cube();
+        long.push(0);
+        let error = Pack::parse(&long).unwrap_err().to_string();
+        assert!(
+            error.contains("header says 7793 bytes, and it has 7794"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn what_is_just_inside_the_limits_can_be_drawn() {
+        let texels = std::vec![0; 1 << 16];
+        let colours = Colours::BUILT_IN;
+        let background = Entry::parse("cube").unwrap().scene(&[]).background;
+        let extent = [MAX_EXTENT, -MAX_EXTENT];
+        let vertices: Vec<_> = (0..MAX_VERTICES)
+            .map(|i| [0, 1, 2].map(|k| extent[(i >> k) & 1]))
+            .collect();
+        let corners: Vec<_> = (0..MAX_ALL_CORNERS)
+            .map(|i| Corner {
+                vertex: (i * 5 % MAX_VERTICES) as u16,
+                u: (256 << 16) * (i as i32 & 1),
+                v: (256 << 16) * (i as i32 >> 1 & 1),
+            })
+            .collect();
+        let faces = std::vec![
+            Face {
+                corners: 3,
+                normal: [9460, 9459, -9459],
+                ..Face::default()
+            };
+            MAX_FACES
+        ];
+        let parts = Parts {
+            mesh: Mesh {
+                vertices: &vertices,
+                corners: &corners,
+                faces: &faces,
+            },
+            texture: Texture::new(&texels, 256, 256).unwrap(),
+            colours,
+            background,
+        };
+        let mut bytes = Vec::new();
+        parts.write(|part| bytes.extend_from_slice(part));
+        assert!((MAX_BYTES * 3 / 4..=MAX_BYTES).contains(&bytes.len()));
+        let pack = Pack::parse(&bytes).unwrap();
+        let mut arena = Box::new(Arena::new());
+        let entry = pack.entry(&mut arena);
+        let mut storage = Box::new(Storage::new());
+        let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
+        let textures = [entry.paint(&mut painted)];
+        let mut stage = Stage::new(&mut storage, entry.scene(&textures));
+        let pose = Pose {
+            distance: Pose::MAX_DISTANCE,
+            ..entry.pose(77)
+        };
+        let stats = stage.draw(&pose, &mut PlanarBuffer::new());
+        assert!(stats.polygons > 1000, "{stats:?}");
+    }
+}
