@@ -78,6 +78,7 @@ fn dump(content: Content) -> Dump {
         header: Header {
             content,
             scene: "ball".into(),
+            pack: None,
             mapper: Word::new("exact").unwrap(),
             picture: Some(Picture::Frame(480)),
             start: 0x4B00,
@@ -289,10 +290,10 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         ),
         (
             "later",
-            good.replacen(lines[0], &framed("crystal-ball dump 3"), 1)
+            good.replacen(lines[0], &framed("crystal-ball dump 4"), 1)
                 .into(),
             [
-                "line 1: it is a dump of version 3; this program reads version 2",
+                "line 1: it is a dump of version 4; this program reads version 3",
                 "take the dump again",
             ],
         ),
@@ -309,7 +310,7 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         (
             "edited",
             good.replacen("line 007 e8", "line 007 e9", 1).into(),
-            ["line 31: ", "take the dump again"],
+            ["line 32: ", "take the dump again"],
         ),
         (
             "cut.png",

@@ -10,6 +10,8 @@ use anyhow::{Context, anyhow, bail};
 use emulator::Vga;
 use link::dump::{Header, PLANE_BYTES};
 use link::{Command, Content, ERROR, OK, Picture, Setting, Word};
+use pack::Pack;
+use scene::catalogue::Entry;
 use show::{Memory, Show};
 
 use crate::dump::Dump;
@@ -65,6 +67,8 @@ pub trait Card {
 #[derive(Debug)]
 pub struct Emulated<'a> {
     show: Show<'a, Vga>,
+    /// The checksum of the pack with the model.
+    pack: Option<u32>,
     scene: String,
     /// The mapper that is set, and the one that drew the picture.
     mapper: Option<Word>,
@@ -78,8 +82,17 @@ impl<'a> Emulated<'a> {
     /// # Errors
     /// What the card finds wrong with the mode set.
     pub fn new(memory: &'a mut Memory) -> anyhow::Result<Self> {
+        Self::with(memory, None)
+    }
+
+    /// The same, with the model of a pack as its default scene.
+    ///
+    /// # Errors
+    /// As [`Emulated::new`].
+    pub fn with(memory: &'a mut Memory, pack: Option<&Pack<'a>>) -> anyhow::Result<Self> {
         let mut this = Self {
-            show: Show::new(memory, Vga::new()),
+            show: Show::new(memory, Vga::new(), pack),
+            pack: pack.map(Pack::checksum),
             scene: String::new(),
             mapper: None,
             drawn_by: None,
@@ -161,6 +174,7 @@ impl Card for Emulated<'_> {
             header: Header {
                 content,
                 scene: self.scene.clone(),
+                pack: self.pack.filter(|_| self.scene == Entry::LOADED),
                 mapper: self.drawn_by.context("the show was never held")?,
                 picture: self.picture,
                 start: page.start,

@@ -288,7 +288,7 @@ impl Shape {
 /// pictures.
 ///
 /// # Errors
-/// When they can't be compared: other contents or sizes, or palettes that hold the same colours in
+/// When they can't be compared: other contents, sizes or models, or palettes that hold the same colours in
 /// another order, as some programs leave them in a PNG: its indices then say nothing.
 pub fn compare(expected: &Subject, got: &Subject) -> anyhow::Result<Option<Difference>> {
     let difference = match (expected, got) {
@@ -321,12 +321,22 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
         );
     }
     same_size((a.width, a.height), (b.width, b.height))?;
+    if let (Some(expected), Some(got)) = (a.pack, b.pack)
+        && expected != got
+    {
+        bail!(
+            "they show different models: expected is of the pack {expected:08x}, got of \
+             {got:08x}; take both with the same --model and --texture"
+        );
+    }
+    let pack = |pack: Option<u32>| pack.map_or("none".into(), |pack| format!("{pack:08x}"));
     let picture = |picture: Option<link::Picture>| match picture {
         Some(picture) => picture.to_string(),
         None => "none".into(),
     };
     let fields = [
         ("scene", a.scene.clone(), b.scene.clone()),
+        ("pack", pack(a.pack), pack(b.pack)),
         ("mapper", a.mapper.to_string(), b.mapper.to_string()),
         ("picture", picture(a.picture), picture(b.picture)),
         (
@@ -780,6 +790,7 @@ mod tests {
             header: Header {
                 content,
                 scene: "ball".into(),
+                pack: None,
                 mapper: Word::new("exact").unwrap(),
                 picture: Some(Picture::Frame(480)),
                 start: 0x4B00,
@@ -887,6 +898,8 @@ mod tests {
              1 of 256 palette entries differs, first 00: expected 000000, got 010101; \
              scene: expected ball, got cube; picture: expected 480, got none"
         );
+        let model = told(Content::Page, |got| got.header.pack = Some(0x1A2B));
+        assert_eq!(model, "pack: expected none, got 00001a2b");
     }
 
     #[test]

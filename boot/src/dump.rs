@@ -261,6 +261,17 @@ impl<'a> Reader<'a> {
             other => return Err(format!("content is 'page' or 'memory', not '{other}'")),
         };
         let scene = self.line("scene")?.to_string();
+        let pack = match self.line("pack")? {
+            "none" => None,
+            digits => {
+                let mut checksum = Vec::new();
+                hex(digits, &mut checksum)?;
+                let checksum: [u8; 4] = checksum
+                    .try_into()
+                    .map_err(|_| "a pack's checksum has eight digits")?;
+                Some(u32::from_be_bytes(checksum))
+            }
+        };
         let mapper = self.line("mapper")?;
         let mapper = Word::new(mapper).ok_or_else(|| format!("'{mapper}' is no mapper's name"))?;
         let picture = match self.line("picture")? {
@@ -291,6 +302,7 @@ impl<'a> Reader<'a> {
         Ok(Header {
             content,
             scene,
+            pack,
             mapper,
             picture,
             start: u16::from_be_bytes(start),

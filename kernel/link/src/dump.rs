@@ -1,9 +1,10 @@
 //! Dumps: what a card holds, as text that `diff` can compare.
 //!
 //! ```text
-//! crystal-ball dump 2
+//! crystal-ball dump 3
 //! content page
 //! scene ball
+//! pack none
 //! mapper shifts
 //! picture 480
 //! start 4b00
@@ -21,6 +22,10 @@
 //! line, so that a line of a page is a line of the dump. Pixel i of a line is in plane i & 3 at
 //! the line's address plus i / 4; the last line holds the sixteen addresses that are left over.
 //!
+//! The pack is `none` where a built-in scene is shown; otherwise it is the checksum of the pack that
+//! the model came with, eight hex digits. Dumps of different packs are of different models, though
+//! their scenes have one name.
+//!
 //! Two dumps of the same picture on different pages differ in their `start` alone.
 
 use core::fmt;
@@ -28,7 +33,7 @@ use core::fmt;
 use crate::{Checksum, Content, Picture, Word};
 
 /// Version of the format, in a dump's first line.
-pub const VERSION: u32 = 2;
+pub const VERSION: u32 = 3;
 /// How a dump's first line begins; the version follows.
 pub const MAGIC: &str = "crystal-ball dump";
 /// Addresses of each plane.
@@ -45,6 +50,8 @@ pub struct Header<S> {
     pub content: Content,
     /// The scene's name, a word.
     pub scene: S,
+    /// The checksum of the pack that the scene came with; none for a built-in one.
+    pub pack: Option<u32>,
     /// The name of the mapper that drew it.
     pub mapper: Word,
     /// What is on the screen; nothing before the first picture.
@@ -163,6 +170,7 @@ pub fn write<S: fmt::Display>(
     let Header {
         content,
         scene,
+        pack,
         mapper,
         picture,
         start,
@@ -172,6 +180,10 @@ pub fn write<S: fmt::Display>(
     put(format_args!("{MAGIC} {VERSION}"));
     put(format_args!("content {content}"));
     put(format_args!("scene {scene}"));
+    match pack {
+        Some(pack) => put(format_args!("pack {pack:08x}")),
+        None => put(format_args!("pack none")),
+    }
     put(format_args!("mapper {mapper}"));
     match picture {
         Some(picture) => put(format_args!("picture {picture}")),
@@ -293,6 +305,7 @@ mod tests {
         Header {
             content,
             scene: "ball",
+            pack: None,
             mapper: Word::new("exact").unwrap(),
             picture: Some(Picture::Frame(u32::MAX)),
             start: 0x4B00,
@@ -319,12 +332,12 @@ mod tests {
             (Content::Memory, 820, "memory fff0 "),
         ] {
             let lines = lines(content);
-            assert_eq!(lines.len(), 7 + 16 + rows + 1);
-            assert_eq!(lines[0], "crystal-ball dump 2");
-            assert_eq!(lines[4], "picture 4294967295");
-            assert!(lines[22].starts_with("palette f0 3f0001 3f0001"));
-            assert!(lines[rows + 22].starts_with(last), "{}", lines[rows + 22]);
-            assert!(lines[rows + 23].starts_with(&std::format!("end {} lines ", rows + 23)));
+            assert_eq!(lines.len(), 8 + 16 + rows + 1);
+            assert_eq!(lines[0], "crystal-ball dump 3");
+            assert_eq!(lines[5], "picture 4294967295");
+            assert!(lines[23].starts_with("palette f0 3f0001 3f0001"));
+            assert!(lines[rows + 23].starts_with(last), "{}", lines[rows + 23]);
+            assert!(lines[rows + 24].starts_with(&std::format!("end {} lines ", rows + 24)));
             for line in &lines {
                 let mut sent = Vec::new();
                 crate::write_line(format_args!("{line}"), |bytes| {

@@ -28,14 +28,16 @@
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
 //! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
 //! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `page 1 start 4b00` |
-//! | `version` | `crystal-ball 0.1.0 protocol 3 dump 2` |
+//! | `version` | `crystal-ball 0.1.0 protocol 4 dump 3` |
 //! | `fail KIND` | none: the kernel breaks in the way that is named ([`Fault`]) |
 //! | `leave` | after the `ok` QEMU ends |
 //!
 //! Commands that come while an answer is under way are answered after it, in their order. A host
 //! that does not read is waited for. Between answers the kernel says on its own:
 //!
-//! - `hello crystal-ball VERSION protocol 3`: the boot loader has handed over;
+//! - `hello crystal-ball VERSION protocol 4`: the boot loader has handed over;
+//! - `loaded pack 1a2b3c4d`, with the pack's checksum, or `refused pack: ...`, and why: if the
+//!   boot loader brought a ramdisk, right after it;
 //! - `running`: the first picture is on the screen;
 //! - `panic ...`, `exception ...`, and lines that explain it, then [`END_OF_REPORT`].
 #![no_std]
@@ -51,12 +53,16 @@ pub use frame::{Checksum, FrameError, unframe, write_line};
 pub use lines::{Lines, Noise};
 
 /// The protocol's version, in the kernel's first line.
-pub const PROTOCOL: u32 = 3;
+pub const PROTOCOL: u32 = 4;
 /// Longest line in bytes, its checksum included, its end not: 320 pixels of a dump with their
 /// label take 657.
 pub const MAX_LINE: usize = 700;
 /// First word of the kernel's first line.
 pub const HELLO: &str = "hello";
+/// First word of the line that says that the ramdisk's pack was taken.
+pub const LOADED: &str = "loaded";
+/// First word of the line that says that it was not.
+pub const REFUSED: &str = "refused";
 /// The line that says that the first picture is on the screen.
 pub const RUNNING: &str = "running";
 /// First word of a panic's first line.

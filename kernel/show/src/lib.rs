@@ -15,6 +15,7 @@ use core::fmt;
 use link::dump::{self, Header};
 use link::{Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting, Word};
 use modex::{Bus, Counted, HEIGHT, ModeX, Offscreen, Readback, Tally, WIDTH};
+use pack::{Arena, Pack};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{Pose, Stage, Storage};
 use texmap::{Mapper, Order, Stats};
@@ -25,9 +26,10 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// Where an answer's lines go, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
-/// The fixed memory of the program. About 2 MiB: meant for a static.
+/// The fixed memory of the program. About 2.5 MiB: meant for a static.
 #[derive(Debug)]
 pub struct Memory {
+    model: Arena,
     texels: [u8; MAX_TEXELS],
     storage: Storage,
     offscreen: Offscreen,
@@ -37,6 +39,7 @@ impl Memory {
     /// Empty.
     pub const fn new() -> Self {
         Self {
+            model: Arena::new(),
             texels: [0; MAX_TEXELS],
             storage: Storage::new(),
             offscreen: Offscreen::new(),
@@ -74,8 +77,10 @@ struct Pace {
 #[derive(Debug)]
 pub struct Show<'a, B> {
     card: ModeX<Counted<B>>,
+    /// The model that was loaded, and its pack's checksum.
+    model: Option<(Entry<'a>, u32)>,
     /// The scene on the stage, and where its texture is painted.
-    entry: &'static Entry,
+    entry: Entry<'a>,
     texels: &'a mut [u8; MAX_TEXELS],
     stage: Stage<'a>,
     offscreen: &'a mut Offscreen,
@@ -89,15 +94,19 @@ pub struct Show<'a, B> {
 }
 
 impl<'a, B: Bus> Show<'a, B> {
-    /// Paints the scene into `memory` and sets the card's mode. The show runs.
+    /// Paints the default scene into `memory` and sets the card's mode. The show runs. With a
+    /// `pack` its model is a scene beside the built-in ones, and the default; otherwise the ball is.
     ///
     /// # Panics
     /// If the card does not read back as it was set: it can't be drawn on.
-    pub fn new(memory: &'a mut Memory, bus: B) -> Self {
-        let entry = &CATALOGUE[0];
+    pub fn new(memory: &'a mut Memory, bus: B, pack: Option<&Pack<'a>>) -> Self {
+        let arena = &mut memory.model;
+        let model = pack.map(|pack| (pack.entry(arena), pack.checksum()));
+        let entry = default_scene(model);
         let textures = [entry.paint(&mut memory.texels)];
         let stage = Stage::new(&mut memory.storage, entry.scene(&textures));
         Self {
+            model,
             entry,
             texels: &mut memory.texels,
             card: expect(ModeX::set(Counted::new(bus), stage.palette())),
@@ -157,12 +166,12 @@ impl<'a, B: Bus> Show<'a, B> {
             Command::Hold => {
                 self.stage.set_mapper(Mapper::default());
                 self.stage.set_order(Order::default());
-                self.set_scene(&CATALOGUE[0]);
+                self.set_scene(default_scene(self.model));
                 self.hold();
             }
             Command::Run => self.pace = Some(Pace::default()),
             Command::Show(picture) => {
-                let Some(pose) = pose(self.entry, picture) else {
+                let Some(pose) = pose(&self.entry, picture) else {
                     let most = Pose::MAX_DISTANCE;
                     out(format_args!("{ERROR} a distance is 0 to {most:08x}"));
                     return None;
@@ -239,7 +248,8 @@ impl<'a, B: Bus> Show<'a, B> {
     fn set(&mut self, setting: Setting, name: &Word) -> Option<()> {
         match setting {
             Setting::Scene => {
-                self.set_scene(Entry::parse(name.as_str())?);
+                let named = self.scenes().find(|entry| entry.name == name.as_str())?;
+                self.set_scene(named);
                 self.reset();
             }
             Setting::Mapper => self.stage.set_mapper(Mapper::parse(name.as_str())?),
@@ -248,8 +258,14 @@ impl<'a, B: Bus> Show<'a, B> {
         Some(())
     }
 
+    /// Every scene that can be set.
+    fn scenes(&self) -> impl Iterator<Item = Entry<'a>> + use<'a, B> {
+        let model = self.model.map(|(entry, _)| entry);
+        CATALOGUE.iter().copied().chain(model)
+    }
+
     /// Puts a scene on the stage; the card has to be reset then, for its palette and background.
-    fn set_scene(&mut self, entry: &'static Entry) {
+    fn set_scene(&mut self, entry: Entry<'a>) {
         if entry.name != self.entry.name {
             self.entry = entry;
             let textures = [entry.paint(self.texels)];
@@ -266,7 +282,7 @@ impl<'a, B: Bus> Show<'a, B> {
         };
         match setting {
             Setting::Scene => {
-                for entry in &CATALOGUE {
+                for entry in self.scenes() {
                     tell(entry.name == self.entry.name, entry.name, entry.about);
                 }
             }
@@ -304,6 +320,10 @@ impl<'a, B: Bus> Show<'a, B> {
         Header {
             content,
             scene: self.stage.name(),
+            pack: self
+                .model
+                .filter(|(entry, _)| entry.name == self.stage.name())
+                .map(|(_, checksum)| checksum),
             mapper: Word::of(self.mapper).expect("a mapper's name is a word"),
             picture: self.picture,
             start: self.card.start_address(),
@@ -369,8 +389,13 @@ impl<'a, B: Bus> Show<'a, B> {
     }
 }
 
+/// The scene of a show that was not told another one.
+fn default_scene<'a>(model: Option<(Entry<'a>, u32)>) -> Entry<'a> {
+    model.map_or(CATALOGUE[0], |(entry, _)| entry)
+}
+
 /// The pose of a scene's picture; none if it is outside the legal range.
-pub fn pose(scene: &Entry, picture: Picture) -> Option<Pose> {
+pub fn pose(scene: &Entry<'_>, picture: Picture) -> Option<Pose> {
     match picture {
         Picture::Frame(frame) => Some(scene.pose(frame)),
         Picture::Pose {
