@@ -19,7 +19,7 @@ use texmap::{Face, Mapper, Point, Texture};
 const AFFINE_BITS: u32 = 7;
 
 /// A golden's scene.
-fn scene(golden: &Golden) -> &'static Entry {
+fn scene(golden: &Golden) -> &'static Entry<'static> {
     golden.look.scene.map_or(&CATALOGUE[0], |scene| scene.0)
 }
 

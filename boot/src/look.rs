@@ -15,7 +15,7 @@ use texmap::{Mapper, Order};
 pub struct Look {
     /// What is shown
     #[arg(long, global = true, value_name = "NAME")]
-    pub scene: Option<Named<&'static Entry>>,
+    pub scene: Option<Named<&'static Entry<'static>>>,
     /// How textures are mapped
     #[arg(long, global = true, value_name = "NAME", value_parser = Mappers)]
     pub mapper: Option<Mapper>,
@@ -70,10 +70,10 @@ impl TypedValueParser for Mappers {
 }
 
 /// All scenes.
-static SCENES: LazyLock<Vec<Named<&'static Entry>>> =
+static SCENES: LazyLock<Vec<Named<&'static Entry<'static>>>> =
     LazyLock::new(|| CATALOGUE.iter().map(Named).collect());
 
-impl ValueEnum for Named<&'static Entry> {
+impl ValueEnum for Named<&'static Entry<'static>> {
     fn value_variants<'a>() -> &'a [Self] {
         &SCENES
     }

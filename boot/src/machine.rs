@@ -30,7 +30,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
 use link::{
-    Command, Content, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, Lines, OK, PANIC, RUNNING,
+    Command, Content, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, LOADED, Lines, OK, PANIC,
+    REFUSED, RUNNING,
 };
 use rustix::process::{Pid, Signal, kill_process_group, test_kill_process};
 use serde_json::{Value, json};
@@ -66,6 +67,9 @@ pub struct Config {
     pub vga: String,
     /// QEMU's `-display`; `none` without a window.
     pub display: String,
+    /// The checksum of the pack that the kernel has to take. Without one it need not, and what it
+    /// says of it is kept ([`Machine::said_of_pack`]).
+    pub pack: Option<u32>,
     /// More arguments for QEMU.
     pub arguments: Vec<OsString>,
     /// Where the evidence of a failure is kept, in a folder of its own each time.
@@ -80,6 +84,7 @@ impl Config {
             image: ready.image.clone(),
             vga: "std".into(),
             display: "none".into(),
+            pack: None,
             arguments: Vec::new(),
             failures: ready.image.with_file_name("failures"),
         }
@@ -106,6 +111,8 @@ pub struct Machine {
 struct Seen {
     /// The kernel's first line.
     hello: bool,
+    /// What the kernel said of its ramdisk's pack.
+    pack: Option<String>,
     /// The kernel was asked to leave.
     leaving: bool,
     /// The window was told to pause the machine.
@@ -183,7 +190,34 @@ impl Machine {
                 return Err(machine.fail(Verdict::BootLoader { reset: false }));
             }
         }
+        if let Some(pack) = config.pack {
+            machine.wait_for_pack(pack)?;
+        }
         Ok(machine)
+    }
+
+    /// Waits until the kernel has taken the pack of this checksum.
+    fn wait_for_pack(&mut self, pack: u32) -> anyhow::Result<()> {
+        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
+        while self.seen.pack.is_none() {
+            if !self.pump_or_wait(&mut patience)? {
+                return Err(self.fail(Verdict::Hang {
+                    waited_for: "what the kernel says of the model".into(),
+                }));
+            }
+        }
+        match self.said_of_pack() {
+            Some(said) if said == format!("{LOADED} pack {pack:08x}") => Ok(()),
+            said => bail!(
+                "the kernel should have taken the pack {pack:08x}, and says '{}'",
+                said.unwrap_or_default()
+            ),
+        }
+    }
+
+    /// What the kernel has said of its ramdisk's pack: that it was taken, or why it was refused.
+    pub fn said_of_pack(&self) -> Option<&str> {
+        self.seen.pack.as_deref()
     }
 
     /// QEMU's process.
@@ -412,6 +446,8 @@ impl Machine {
                     "the kernel says '{line}'; this program speaks {spoken}"
                 ));
             }
+        } else if [LOADED, REFUSED].contains(&word) {
+            self.seen.pack = Some(line);
         } else if [PANIC, EXCEPTION].contains(&word) || !self.seen.report.is_empty() {
             let whole = line == END_OF_REPORT;
             self.seen.report.push(line);

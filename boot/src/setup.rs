@@ -37,6 +37,8 @@ pub struct Options {
     pub qemu: Option<PathBuf>,
     /// A window is wanted: QEMU's window packages are looked for, too.
     pub window: bool,
+    /// What the kernel is to find in its ramdisk: a pack, as a rule.
+    pub ramdisk: Option<Vec<u8>>,
 }
 
 /// All that is needed to boot.
@@ -103,7 +105,11 @@ fn boot_files(
     let toolchain = toolchain::get(cache, options)?;
     let maker = build::image_maker(cache, &toolchain)?;
     let kernel = build::kernel(&toolchain, program)?;
-    let image = build::image(&maker, program)?;
+    let ramdisk = options
+        .ramdisk
+        .as_deref()
+        .filter(|_| program == Program::Show);
+    let image = build::image(&maker, program, ramdisk)?;
     Ok((kernel, image))
 }
 

@@ -32,6 +32,8 @@ pub const BOOT: BootloaderConfig = {
 pub struct Machine {
     /// The VGA.
     pub vga: Window,
+    /// What the boot loader has read of the image's ramdisk, if it has one.
+    pub ramdisk: Option<&'static [u8]>,
 }
 
 /// Makes the machine ready. Called once, at the start.
@@ -53,7 +55,12 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     // SAFETY: the boot loader maps all physical memory at `offset`, the card's window with it,
     // for as long as the kernel runs; no other pointer is made to it.
     let vga = unsafe { Window::new(base) };
-    Machine { vga }
+    let ramdisk = boot_info.ramdisk_addr.into_option().map(|address| {
+        // SAFETY: the boot loader maps the ramdisk there, as many bytes of it, for as long as the
+        // kernel runs; nothing else points to it, and nobody writes it.
+        unsafe { core::slice::from_raw_parts(address as *const u8, boot_info.ramdisk_len as usize) }
+    });
+    Machine { vga, ramdisk }
 }
 
 /// Sleeps until an interrupt: a tick, or a byte on the serial line. `idle` is asked with

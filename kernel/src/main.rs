@@ -12,6 +12,8 @@
 
 use bootloader_api::{BootInfo, BootloaderConfig};
 use crystal_ball_kernel::machine::{self, serial, timer};
+use link::{LOADED, REFUSED};
+use pack::Pack;
 use show::{Memory, Request, Show};
 use spin::Mutex;
 
@@ -24,7 +26,8 @@ static BOOT: BootloaderConfig = machine::BOOT;
 fn start(boot_info: &'static mut BootInfo) -> ! {
     let machine = machine::init(boot_info);
     let mut memory = MEMORY.lock();
-    let mut show = Show::new(&mut memory, machine.vga);
+    let pack = machine.ramdisk.and_then(taken);
+    let mut show = Show::new(&mut memory, machine.vga, pack.as_ref());
     let out: &mut show::Out<'_> = &mut |line| serial::line(line);
     loop {
         while let Some(byte) = serial::receive() {
@@ -39,6 +42,21 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
             show.present(tick, out);
         } else {
             machine::sleep_while(|| timer::ticks() == tick && !serial::has_received());
+        }
+    }
+}
+
+/// The ramdisk's pack, which is told on the serial line. One that is none is told as well, and why:
+/// the built-in scenes are there all the same.
+fn taken(ramdisk: &'static [u8]) -> Option<Pack<'static>> {
+    match Pack::parse(ramdisk) {
+        Ok(pack) => {
+            serial::line(format_args!("{LOADED} pack {:08x}", pack.checksum()));
+            Some(pack)
+        }
+        Err(error) => {
+            serial::line(format_args!("{REFUSED} pack: {error}"));
+            None
         }
     }
 }

@@ -168,16 +168,25 @@ pub fn is_whole(place: &Path) -> bool {
 }
 
 /// Makes the image. Always: it takes a tenth of a second, and an image of another kernel would be worse.
-pub fn image(maker: &Path, program: Program) -> anyhow::Result<PathBuf> {
-    let [kernel, image] = files(program);
+///
+/// One with a ramdisk has a name that says which: two runs with two models may be at it at once.
+pub fn image(maker: &Path, program: Program, ramdisk: Option<&[u8]>) -> anyhow::Result<PathBuf> {
+    let [kernel, mut image] = files(program);
     let [_, folder] = folders();
     fs::create_dir_all(&folder)?;
     let aside = tempfile::Builder::new()
         .prefix(".aside")
         .tempdir_in(&folder)?;
     let made = aside.path().join(program.image());
-    child::run(child::command(maker).arg(&kernel).arg(&made))
-        .context("the disk image cannot be made")?;
+    let mut make = child::command(maker);
+    make.arg(&kernel).arg(&made);
+    if let Some(bytes) = ramdisk {
+        let file = aside.path().join("ramdisk");
+        fs::write(&file, bytes).context("the ramdisk cannot be written")?;
+        make.arg(file);
+        image.set_file_name(format!("model-{}.img", &sha256(bytes)[..16]));
+    }
+    child::run(&mut make).context("the disk image cannot be made")?;
     // Others may be booting the old one: they keep it, this is a new file.
     fs::rename(made, &image).with_context(|| format!("{} cannot be written", image.display()))?;
     Ok(image)

@@ -118,7 +118,7 @@ pub fn with<T>(name: &str, seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T
 }
 
 /// Makes a subject of a scene at some poses, and lends it.
-pub fn with_poses<T>(entry: &Entry, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
+pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = Box::new(Storage::new());
     let textures = [entry.paint(&mut texels)];
