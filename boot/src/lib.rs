@@ -13,6 +13,7 @@ pub mod machine;
 pub mod measure;
 pub mod record;
 pub mod replay;
+pub mod model;
 pub mod report;
 pub mod screen;
 pub mod setup;

@@ -15,6 +15,7 @@ use crystal_ball::frames::Frames;
 use crystal_ball::golden;
 use crystal_ball::look::Look;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
+use crystal_ball::model::{Files, Model};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child, record, replay, trade};
 use show::Memory;
@@ -38,6 +39,8 @@ struct Cli {
     #[command(flatten)]
     look: Look,
     #[command(flatten)]
+    model: Files,
+    #[command(flatten)]
     tools: Tools,
     /// More arguments for QEMU, after `--`
     #[arg(last = true, value_name = "QEMU ARGUMENTS")]
@@ -51,6 +54,8 @@ Examples (`cargo run -- ` hands on what follows):
   cargo run -- --vga cirrus            on another display adapter
   cargo run -- --mapper exact          with another mapper (--help lists them, -h does not)
   cargo run -- -- -machine q35 -m 64   with more arguments for QEMU
+  cargo run -- --model thing.obj --texture thing.png
+                                       with your own model and its texture
   cargo run -- doctor                  what is set up, and where
   cargo run -- record --out ball.gif   a turn of the ball as a GIF
   cargo run -- replay DIR              play a folder of dumps in the terminal
@@ -195,7 +200,9 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
         toolchain: cli.tools.toolchain,
         qemu: cli.tools.qemu,
         window: false,
+        ramdisk: None,
     };
+    let files = cli.model;
     match cli.command {
         Some(Subcommands::Doctor) => {
             options.window = has_display();
@@ -210,9 +217,11 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             setup::clean(&mut Output)?;
         }
         Some(Subcommands::Dump(frames)) => {
+            let pack = load_to_boot(&files, &mut options)?;
             let ready = setup::ready(&options)?;
             let mut machine = Machine::boot(&Config {
                 vga: cli.boot.vga,
+                pack,
                 arguments: cli.qemu_arguments,
                 ..Config::new(&ready)
             })?;
@@ -220,8 +229,14 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             machine.leave()?;
         }
         Some(Subcommands::Emulate(frames)) => {
+            let model = files.load()?;
+            if let Some(model) = &model {
+                say(model);
+            }
+            let pack = model.as_ref().map(Model::pack);
             let mut memory = Box::new(Memory::new());
-            frames.write(&mut Emulated::new(&mut memory)?, &cli.look, tell_path)?;
+            let mut card = Emulated::with(&mut memory, pack.as_ref())?;
+            frames.write(&mut card, &cli.look, tell_path)?;
         }
         Some(Subcommands::Record(recording)) => {
             if let Err(error) = recording.check() {
@@ -269,14 +284,41 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             say("what was found, as a page with the tables and plots beside it:");
             tell_path(&page)?;
         }
-        Some(Subcommands::Image { out }) => write_image(&setup::image(&options)?, &out)?,
+        Some(Subcommands::Image { out }) => {
+            load_to_boot(&files, &mut options)?;
+            write_image(&setup::image(&options)?, &out)?;
+        }
         None => {
+            let pack = load_to_boot(&files, &mut options)?;
             options.window = !cli.boot.headless && has_display();
             let ready = setup::ready(&options)?;
-            watch(&ready, &cli.boot, &cli.look, cli.qemu_arguments)?;
+            let config = Config {
+                vga: cli.boot.vga,
+                pack,
+                arguments: cli.qemu_arguments,
+                ..Config::new(&ready)
+            };
+            watch(&ready, config, cli.boot.headless, &cli.look)?;
         }
     }
     Ok(ExitCode::SUCCESS)
+}
+
+/// Makes the user's model, if there is one, the ramdisk of the image; tells what it is and what it
+/// costs. Returns its pack's checksum.
+fn load_to_boot(files: &Files, options: &mut Options) -> anyhow::Result<Option<u32>> {
+    let Some(model) = files.load()? else {
+        return Ok(None);
+    };
+    say(&model);
+    say(format_args!(
+        "with its {} KiB the boot takes about {:.1} s longer",
+        model.bytes.len().div_ceil(1024),
+        model.boot_seconds()
+    ));
+    let checksum = model.pack().checksum();
+    options.ramdisk = Some(model.bytes);
+    Ok(Some(checksum))
 }
 
 /// A file was written: its path goes where the next program in a pipe reads it.
@@ -291,13 +333,13 @@ fn has_display() -> bool {
 }
 
 /// Boots the image and lets the user watch, or takes a picture where there is nothing to watch on.
-fn watch(ready: &Ready, boot: &Boot, look: &Look, arguments: Vec<OsString>) -> anyhow::Result<()> {
+fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::Result<()> {
     let displays = &ready.qemu.displays;
     let window = ["gtk", "sdl"]
         .into_iter()
         .find(|window| displays.iter().any(|display| display == window))
-        .filter(|_| !boot.headless && has_display());
-    if window.is_none() && !boot.headless {
+        .filter(|_| !headless && has_display());
+    if window.is_none() && !headless {
         let why = if has_display() {
             "this QEMU has no window (on Debian the package qemu-system-gui brings one)"
         } else {
@@ -308,10 +350,8 @@ fn watch(ready: &Ready, boot: &Boot, look: &Look, arguments: Vec<OsString>) -> a
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
-        vga: boot.vga.clone(),
         display: window.unwrap_or("none").to_string(),
-        arguments,
-        ..Config::new(ready)
+        ..config
     })?;
     machine.wait_until_running()?;
     for command in look.commands() {
@@ -326,11 +366,11 @@ fn watch(ready: &Ready, boot: &Boot, look: &Look, arguments: Vec<OsString>) -> a
         return machine.watch();
     }
     machine.rest(WARM_UP)?;
-    let picture = ready.image.with_file_name("picture.png");
+    let picture = setup::folder().join("picture.png");
     let screen = machine.screen()?;
     aside::write(&picture, |file| screen.write_png(file))?;
     machine.leave()?;
-    say("a picture of the running ball:");
+    say("a picture of the running show:");
     writeln!(Output, "{}", picture.display())?;
     Ok(())
 }

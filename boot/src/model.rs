@@ -1,0 +1,212 @@
+//! A model of the user's own: a Wavefront OBJ and a PNG, made into a pack.
+//!
+//! ```text
+//! OBJ -> polygons on the grid -> layout of the texture -> mesh   \
+//! PNG ------------------------> cut from the repeated picture     > pack -> ramdisk, emulated card
+//!                               -> texels, palette, light table  /
+//! ```
+//!
+//! All of it is done here, once, in floating point where that is easier; what comes out is integers
+//! ([`pack`] has the format). The same files make the same pack.
+
+pub mod colour;
+pub mod mesh;
+pub mod obj;
+pub mod texture;
+
+use std::fmt;
+use std::fs::File;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, ensure};
+use pack::{Pack, Parts};
+use scene::Mesh;
+use scene::catalogue::{Colours, Entry, MAX_TEXELS};
+use texmap::Texture;
+
+use colour::Reduced;
+use mesh::{Polygons, Solid, Tally};
+use obj::Obj;
+use texture::Layout;
+
+/// Most bytes of an OBJ: far more than a model of [`pack::MAX_FACES`] faces has.
+const MAX_BYTES: u64 = 64 << 20;
+/// Bytes of a ramdisk that the boot loader reads in a second, measured: an OBJ's pack and none, in
+/// turns.
+const BYTES_A_SECOND: f64 = 1e6 / 3.0;
+/// The scene whose texture a model gets that has none: its lines show how it lies.
+const PATTERN: &str = "tilted";
+
+/// The files of a model.
+#[derive(clap::Args, Clone, Debug, Default)]
+pub struct Files {
+    /// Your own model: a Wavefront OBJ
+    #[arg(long, global = true, value_name = "FILE.obj")]
+    pub model: Option<PathBuf>,
+    /// Its texture [default: a marble board]
+    #[arg(long, global = true, value_name = "FILE.png")]
+    pub texture: Option<PathBuf>,
+}
+
+impl Files {
+    /// Makes the model's pack, if there is a model.
+    ///
+    /// # Errors
+    /// A file that can't be used, with its name, the line where there is one, and the reason.
+    pub fn load(&self) -> anyhow::Result<Option<Model>> {
+        match &self.model {
+            Some(model) => Model::load(model, self.texture.as_deref()).map(Some),
+            None => {
+                ensure!(
+                    self.texture.is_none(),
+                    "--texture is for a --model, and there is none"
+                );
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// A model, packed.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Model {
+    /// The pack's bytes.
+    pub bytes: Vec<u8>,
+    /// What became of its files, for people.
+    about: String,
+}
+
+impl fmt::Debug for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "a model: {}", self.about)
+    }
+}
+
+/// What became of the files, in a line.
+impl fmt::Display for Model {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.about)
+    }
+}
+
+impl Model {
+    /// Makes a model of an OBJ, and of a PNG for a texture; without one it gets a pattern.
+    ///
+    /// # Errors
+    /// As [`Files::load`].
+    pub fn load(obj: &Path, png: Option<&Path>) -> anyhow::Result<Self> {
+        let name = || obj.display().to_string();
+        let mut bytes = Vec::new();
+        File::open(obj)
+            .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+            .context("it cannot be read")
+            .with_context(name)?;
+        if bytes.len() as u64 > MAX_BYTES {
+            return Err(anyhow::anyhow!("it has more than {MAX_BYTES} bytes")).with_context(name);
+        }
+        let picture = match png {
+            Some(png) => {
+                let picture = texture::read(png);
+                Some(picture.with_context(|| png.display().to_string())?)
+            }
+            None => None,
+        };
+        Self::new(&bytes, picture.as_ref()).with_context(name)
+    }
+
+    /// Makes a model of an OBJ's bytes and a picture.
+    ///
+    /// # Errors
+    /// As [`Files::load`], without the name.
+    pub fn new(obj: &[u8], picture: Option<&image::RgbImage>) -> anyhow::Result<Self> {
+        let obj = obj::parse(obj)?;
+        let polygons = Polygons::new(&obj)?;
+        let pattern = Entry::parse(PATTERN).expect("it is in the catalogue");
+        let mut painted = Box::new([0; MAX_TEXELS]);
+        let painted = pattern.paint(&mut painted);
+        let pattern = pattern.scene(&[]);
+        let (side_u, side_v) = (painted.width().into(), painted.height().into());
+        let size = picture.map_or((side_u, side_v), image::RgbImage::dimensions);
+        let layout = Layout::new(&polygons.polygons, size)?;
+        let reduced = picture.map(|picture| {
+            let texels = layout.cut_scaled(picture);
+            colour::reduce(&texels, layout.size().0.into())
+        });
+        let (texels, colours) = match &reduced {
+            Some(Reduced {
+                texels,
+                palette,
+                light,
+            }) => (texels.clone(), Colours { palette, light }),
+            // Its colours are entries of the palette: it is scaled by leaving texels out.
+            None => {
+                let (width, height) = layout.scaled();
+                let pixel = |i, j| {
+                    let (i, j) = (i * side_u / width, j * side_v / height);
+                    painted.texels()[(j * side_u + i) as usize]
+                };
+                (layout.cut(pixel), Colours::BUILT_IN)
+            }
+        };
+        let solid = polygons.solid(&layout)?;
+        let (width, height) = layout.size();
+        let parts = Parts {
+            mesh: Mesh {
+                vertices: &solid.vertices,
+                corners: &solid.corners,
+                faces: &solid.faces,
+            },
+            texture: Texture::new(&texels, width, height)?,
+            colours,
+            background: pattern.background,
+        };
+        let mut bytes = Vec::new();
+        parts.write(|part| bytes.extend_from_slice(part));
+        // What the kernel would refuse must not go on a way of seconds to be told so.
+        Pack::parse(&bytes).context("its pack is wrong, which is this program's fault")?;
+        Ok(Self {
+            about: about(&obj, &solid, (width, height), picture.is_some()),
+            bytes,
+        })
+    }
+
+    /// Its pack.
+    pub fn pack(&self) -> Pack<'_> {
+        Pack::parse(&self.bytes).expect("it was read when it was made")
+    }
+
+    /// How much longer the boot loader takes to read an image with it, in seconds.
+    pub fn boot_seconds(&self) -> f64 {
+        self.bytes.len() as f64 / BYTES_A_SECOND
+    }
+}
+
+/// What became of the files, in a line.
+fn about(obj: &Obj, solid: &Solid, (width, height): (u16, u16), textured: bool) -> String {
+    let Tally {
+        degenerate,
+        cut,
+        projected,
+    } = solid.tally;
+    let mut about = format!(
+        "{} vertices, {} faces",
+        solid.vertices.len(),
+        solid.faces.len()
+    );
+    let of = obj.faces.len();
+    for (count, what) in [
+        (cut, "cut into triangles"),
+        (degenerate, "without an area, left out"),
+        (projected, "with texture coordinates made up"),
+    ] {
+        if count > 0 {
+            about += &format!(", {count} of the file's {of} {what}");
+        }
+    }
+    if obj.undrawn > 0 {
+        about += &format!(", {} points, lines and curves left out", obj.undrawn);
+    }
+    let whose = if textured { "" } else { " of our own" };
+    about + &format!(", texture{whose} {width} x {height}")
+}

@@ -1,0 +1,152 @@
+//! A model's palette, light table and texels.
+//!
+//! Two reductions, each by a quantizer that works in a space of even steps to the eye (Oklab). The
+//! texture is reduced to [`MATERIALS`] colours. Then each of these is lit in all levels, from night
+//! to glint, as the built-in ramps are; and what that gives is reduced to the part of the palette
+//! that background and writing leave free. The light table takes each material at each level to the
+//! nearest entry of the whole palette.
+//!
+//! Where the palette has no colour near enough, a surface would fall into bands. So a texel has not
+//! its material alone: by its place in a square of two by two it is one of [`VARIANTS`], and for
+//! each level the entries of the four are chosen one after the other, each to make good for what the
+//! ones before it were off. Together they have the colour that was meant.
+
+use image::Rgb;
+use modex::{Palette, Rgb6};
+use quantette::color_space::srgb8_to_oklab;
+use quantette::deps::palette::{Oklab, Srgb};
+use quantette::{Pipeline, QuantizeMethod};
+use scene::catalogue::Colours;
+use scene::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable};
+
+use crate::indexed::widen;
+
+/// Texels of one material: two by two.
+const VARIANTS: usize = 4;
+/// Colours of the texture.
+const MATERIALS: usize = 256 / VARIANTS;
+/// Which of the variants a texel is, by whether its column is odd, and its row: what is brightest
+/// and what is darkest lie on a diagonal.
+const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
+/// What the built-in ramps begin in, widened: what is turned from the lamp is lit by the night sky.
+const NIGHT: [f64; 3] = [8.0, 5.0, 28.0];
+/// The lamp's own colour, which a highlight goes to.
+const LAMP: [f64; 3] = [255.0, 253.0, 244.0];
+/// The way to the lamp's colour that the brightest highlight goes.
+const GLINT: f64 = 0.4;
+
+/// What a texture is reduced to.
+#[derive(Clone, Debug)]
+pub struct Reduced {
+    /// Which material and which variant, row by row.
+    pub texels: Vec<u8>,
+    /// The DAC's colours.
+    pub palette: Palette,
+    /// The entry of each texel's value at each level.
+    pub light: LightTable,
+}
+
+/// Reduces a texture of so many columns.
+pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
+    let colours: Vec<_> = texture
+        .iter()
+        .map(|&Rgb(parts)| Srgb::from(parts))
+        .collect();
+    let materials = quantized(&colours, MATERIALS);
+    let of_materials = srgb8_to_oklab(&materials);
+    let nearest_material = Nearest::new(of_materials);
+    let colours = srgb8_to_oklab(&colours);
+    let texels = colours.iter().enumerate().map(|(i, colour)| {
+        let variant = PATTERN[i / columns % 2][i % columns % 2];
+        (nearest_material.to(*colour) * VARIANTS + variant) as u8
+    });
+
+    let lit: Vec<Vec<Srgb<u8>>> = (0..LIGHT_LEVELS)
+        .map(|level| materials.iter().map(|&colour| lit(colour, level)).collect())
+        .collect();
+    let free = scene::MATERIALS;
+    let mut palette = *Colours::BUILT_IN.palette;
+    let own = quantized(&lit.concat(), free.len());
+    for (entry, colour) in palette[free].iter_mut().zip(own) {
+        *entry = narrow(colour);
+    }
+    let shown: Vec<_> = palette
+        .iter()
+        .map(|colour| Srgb::from(colour.map(widen)))
+        .collect();
+    let nearest_entry = Nearest::new(srgb8_to_oklab(&shown));
+    let mut light = [[0; 256]; LIGHT_LEVELS];
+    for (row, lit) in light.iter_mut().zip(lit) {
+        for (entries, target) in row.chunks_exact_mut(VARIANTS).zip(srgb8_to_oklab(&lit)) {
+            let mut wanted = target;
+            let mut chosen = [0; VARIANTS].map(|_: u8| {
+                let entry = nearest_entry.to(wanted);
+                wanted += target - nearest_entry.colours[entry];
+                entry
+            });
+            let lightness = |&entry: &usize| nearest_entry.colours[entry].l;
+            chosen.sort_by(|a, b| lightness(a).total_cmp(&lightness(b)));
+            for (entry, chosen) in entries.iter_mut().zip(chosen) {
+                *entry = chosen as u8;
+            }
+        }
+    }
+    Reduced {
+        texels: texels.collect(),
+        palette,
+        light,
+    }
+}
+
+/// At most `count` colours for all of these.
+fn quantized(colours: &[Srgb<u8>], count: usize) -> Vec<Srgb<u8>> {
+    let size = count.try_into().expect("a palette has at most 256 colours");
+    let pipeline = Pipeline::new()
+        .palette_size(size)
+        .quantize_method(QuantizeMethod::kmeans());
+    let input = pipeline
+        .input_slice(colours)
+        .expect("there are some, and not too many");
+    input.output_srgb8_palette().into_vec()
+}
+
+/// A colour in the light of a level, in steps that look even, as the ramps are.
+fn lit(colour: Srgb<u8>, level: usize) -> Srgb<u8> {
+    let full = (FULL_LIGHT + AMBIENT) as f64;
+    let diffuse = (level.min(FULL_LIGHT) + AMBIENT) as f64 / full;
+    let glint =
+        GLINT * level.saturating_sub(FULL_LIGHT) as f64 / (LIGHT_LEVELS - 1 - FULL_LIGHT) as f64;
+    let parts = [colour.red, colour.green, colour.blue].map(f64::from);
+    let blend = |from: f64, to: f64, part: f64| from + (to - from) * part;
+    Srgb::from([0, 1, 2].map(|k| {
+        let dim = blend(NIGHT[k].min(parts[k]), parts[k], diffuse);
+        blend(dim, LAMP[k], glint).round() as u8
+    }))
+}
+
+/// Eight bits of each part as the DAC's six, rounded.
+fn narrow(colour: Srgb<u8>) -> Rgb6 {
+    [colour.red, colour.green, colour.blue].map(|part| ((u16::from(part) * 63 + 127) / 255) as u8)
+}
+
+/// Looks colours up.
+struct Nearest {
+    colours: Vec<Oklab>,
+}
+
+impl Nearest {
+    fn new(colours: Vec<Oklab>) -> Self {
+        Self { colours }
+    }
+
+    /// The number of the nearest one; of several the first.
+    fn to(&self, colour: Oklab) -> usize {
+        let distance = |other: &Oklab| {
+            let off = *other - colour;
+            off.l * off.l + off.a * off.a + off.b * off.b
+        };
+        let distances = self.colours.iter().map(distance).enumerate();
+        let nearest = distances.min_by(|(_, a), (_, b)| a.total_cmp(b));
+        nearest.map_or(0, |(i, _)| i)
+    }
+}

@@ -1,0 +1,391 @@
+//! From an OBJ's polygons to a mesh of flat convex faces.
+//!
+//! The model is centred and scaled so that a ball of [`RADIUS`] holds it: at the default distance it
+//! fits the screen however it is turned. Then its points are rounded to the mesh's grid, and points
+//! that are one there become one; everything after that is decided on the grid, which is what the
+//! kernel sees.
+//!
+//! # Whole, or cut
+//!
+//! A face of the renderer is convex, flat, and has one texture plane. A polygon that is all of it
+//! stays whole, up to [`MAX_CORNERS`] corners; any other is cut into triangles by ears, which fit
+//! always. Flat is what bends by at most [`FLATNESS`], and one plane is what is off by at most
+//! [`TEXEL_FIT`] texels at a corner: less than can be seen. All pieces of a polygon have its normal,
+//! so that no cut shows in the light.
+//!
+//! # Texture coordinates that are not there
+//!
+//! are made up for every face that lacks one of its own, by projection onto a box about the model's
+//! centre: of its normal's three parts the largest one says which side of the box the face is on,
+//! and each side has the whole texture once. It fits one plane always, has no seam within a face,
+//! and stretches by at most the square root of three.
+
+use std::collections::HashMap;
+
+use anyhow::ensure;
+use earcut::Earcut;
+use earcut::utils3d::project3d_to_2d;
+use pack::{MAX_ALL_CORNERS, MAX_FACES};
+use scene::{Corner, Face, MAX_CORNERS, MAX_VERTICES, Vec3};
+
+use super::obj::Obj;
+use super::texture::Layout;
+
+/// Of the ball that holds the model, in units. From the default distance of 2.95 units its outline
+/// is 115 pixels from the screen's middle, of the 120 to the edge.
+pub const RADIUS: f64 = 1.2;
+/// Furthest that a corner of a face may be from the face's plane, in units: a fifteenth of a pixel
+/// at the default distance.
+const FLATNESS: f64 = 1.0 / 2048.0;
+/// Furthest that a corner of a face may be from its place in the face's texture plane, in texels.
+const TEXEL_FIT: f64 = 1.0 / 16.0;
+/// Smallest part of a face's area that the three corners may have that its texture plane is made of.
+const LEAST_ANCHORED: f64 = 1.0 / 16.0;
+/// One unit on the mesh's grid.
+const GRID: f64 = 65_536.0;
+
+/// A solid, owned.
+#[derive(Clone, Debug, Default)]
+pub struct Solid {
+    /// As [`scene::Mesh`] has them.
+    pub vertices: Vec<Vec3>,
+    /// As [`scene::Mesh`] has them.
+    pub corners: Vec<Corner>,
+    /// As [`scene::Mesh`] has them, but for `first`, which is left zero.
+    pub faces: Vec<Face>,
+    /// What became of the file's faces.
+    pub tally: Tally,
+}
+
+/// What became of the file's faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Without an area: dropped.
+    pub degenerate: usize,
+    /// Not convex, not flat, of too many corners or of no one texture plane: cut into triangles.
+    pub cut: usize,
+    /// Without texture coordinates: made up.
+    pub projected: usize,
+}
+
+/// A polygon on the grid, clockwise as it is seen from its front, and with an area.
+#[derive(Clone, Debug)]
+pub struct Polygon {
+    ring: Vec<Place>,
+    normal: [f64; 3],
+    /// The line of the file that it is on.
+    pub line: usize,
+}
+
+/// A corner of a polygon.
+#[derive(Clone, Copy, Debug)]
+struct Place {
+    vertex: usize,
+    /// On the mesh's grid.
+    at: [f64; 3],
+    /// In whole textures, to the right and down.
+    uv: [f64; 2],
+}
+
+impl Polygon {
+    /// Where its corners are in the texture, in whole textures: to the right, or down.
+    pub fn along(&self, axis: usize) -> impl Iterator<Item = f64> {
+        self.ring.iter().map(move |place| place.uv[axis])
+    }
+
+    /// Makes up its texture coordinates.
+    fn project(&mut self) {
+        let side = (0..3).fold(0, |a, b| {
+            if self.normal[b].abs() > self.normal[a].abs() {
+                b
+            } else {
+                a
+            }
+        });
+        // What is to the right and down on that side of the box as one looks at it from outside:
+        // the top and the bottom with the front's edge nearest.
+        let outward = self.normal[side].signum();
+        let (across, down, turned) = match side {
+            0 => (2, 1, outward),
+            1 => (0, 2, outward),
+            _ => (0, 1, -outward),
+        };
+        for place in &mut self.ring {
+            let part = |k: usize| place.at[k] / (2.0 * RADIUS * GRID);
+            place.uv = match side {
+                1 => [0.5 + part(across), 0.5 + turned * part(down)],
+                _ => [0.5 + turned * part(across), 0.5 + part(down)],
+            };
+        }
+    }
+}
+
+/// The polygons of a file, on the grid.
+#[derive(Clone, Debug, Default)]
+pub struct Polygons {
+    vertices: Vec<Vec3>,
+    /// Those with an area.
+    pub polygons: Vec<Polygon>,
+    tally: Tally,
+}
+
+impl Polygons {
+    /// Puts an OBJ's faces on the grid, the model centred and scaled to fit.
+    ///
+    /// # Errors
+    /// No face with an area, or more vertices than a mesh may have.
+    pub fn new(obj: &Obj) -> anyhow::Result<Self> {
+        ensure!(!obj.faces.is_empty(), "it has no faces");
+        let corners = obj.corners.iter();
+        let used: Vec<_> = corners
+            .map(|corner| obj.positions[corner.position])
+            .collect();
+        let centre = [0, 1, 2].map(|k| {
+            let along = used.iter().map(|position| position[k]);
+            (along.clone().fold(f64::INFINITY, f64::min) + along.fold(-f64::INFINITY, f64::max))
+                / 2.0
+        });
+        let from_centre = |position: [f64; 3]| [0, 1, 2].map(|k| position[k] - centre[k]);
+        let lengths = used.iter().map(|&position| length(from_centre(position)));
+        let scale = RADIUS * GRID / lengths.fold(0.0, f64::max);
+        // y up and z towards the viewer become y down and z away: half a turn about x. A model
+        // without an extent is all in one place.
+        let on_grid = |position| {
+            let [x, y, z] =
+                from_centre(position).map(|k| if scale.is_finite() { k * scale } else { 0.0 });
+            [x, -y, -z].map(|k| k.round() as i32)
+        };
+
+        let mut this = Self::default();
+        let mut known = HashMap::new();
+        for face in &obj.faces {
+            let mut ring: Vec<_> = obj
+                .corners_of(face)
+                .iter()
+                // Counter-clockwise in the file.
+                .rev()
+                .map(|corner| {
+                    let point = on_grid(obj.positions[corner.position]);
+                    let vertex = *known.entry(point).or_insert_with(|| {
+                        this.vertices.push(point);
+                        this.vertices.len() - 1
+                    });
+                    Place {
+                        vertex,
+                        at: point.map(f64::from),
+                        // v is up in the file.
+                        uv: corner.place.map_or([f64::NAN; 2], |place| {
+                            let [u, v] = obj.places[place];
+                            [u, -v]
+                        }),
+                    }
+                })
+                .collect();
+            ring.dedup_by_key(|place| place.vertex);
+            while ring.len() > 1 && ring[0].vertex == ring[ring.len() - 1].vertex {
+                ring.pop();
+            }
+            let Some(normal) = normal(&ring) else {
+                this.tally.degenerate += 1;
+                continue;
+            };
+            let mut polygon = Polygon {
+                ring,
+                normal,
+                line: face.line,
+            };
+            if polygon.along(0).any(f64::is_nan) {
+                polygon.project();
+                this.tally.projected += 1;
+            }
+            this.polygons.push(polygon);
+        }
+        ensure!(
+            !this.polygons.is_empty(),
+            "none of its {} faces has an area",
+            obj.faces.len()
+        );
+        ensure!(
+            this.vertices.len() <= MAX_VERTICES,
+            "it has {} vertices; a model has at most {MAX_VERTICES}: {SIMPLIFY}",
+            this.vertices.len(),
+        );
+        Ok(this)
+    }
+
+    /// The mesh, its places in a texture that is laid out so.
+    ///
+    /// # Errors
+    /// More faces or corners than a pack may have.
+    pub fn solid(self, layout: &Layout) -> anyhow::Result<Solid> {
+        let mut solid = Solid {
+            vertices: self.vertices,
+            tally: self.tally,
+            ..Solid::default()
+        };
+        let mut ears = Ears::default();
+        for polygon in &self.polygons {
+            let places = layout.texels(polygon);
+            let corners = polygon
+                .ring
+                .iter()
+                .zip(places)
+                .map(|(place, [u, v])| Corner {
+                    vertex: place.vertex as u16,
+                    u,
+                    v,
+                });
+            let corners: Vec<_> = corners.collect();
+            let normal = polygon.normal.map(|k| (k * 16_384.0).round() as i32);
+            let mut add = |piece: &mut dyn Iterator<Item = usize>| {
+                let before = solid.corners.len();
+                solid.corners.extend(piece.map(|i| corners[i]));
+                solid.faces.push(Face {
+                    first: 0,
+                    corners: (solid.corners.len() - before) as u16,
+                    texture: 0,
+                    normal,
+                });
+            };
+            let n = corners.len();
+            match first_of_whole(&polygon.ring, polygon.normal, &corners) {
+                Some(first) => add(&mut (0..n).map(|i| (first + i) % n)),
+                None => {
+                    let triangles = ears.cut(&polygon.ring);
+                    solid.tally.cut += 1;
+                    triangles
+                        .iter()
+                        .for_each(|triangle| add(&mut triangle.iter().copied()));
+                }
+            }
+        }
+        ensure!(
+            solid.faces.len() <= MAX_FACES && solid.corners.len() <= MAX_ALL_CORNERS,
+            "its {} faces make {} flat convex ones with {} corners; a model has at most {MAX_FACES} \
+             with {MAX_ALL_CORNERS}: {SIMPLIFY}",
+            self.polygons.len() + self.tally.degenerate,
+            solid.faces.len(),
+            solid.corners.len(),
+        );
+        ensure!(
+            !solid.faces.is_empty(),
+            "none of its faces can be cut into triangles"
+        );
+        Ok(solid)
+    }
+}
+
+const SIMPLIFY: &str = "simplify it in the program that made it";
+
+/// Of a polygon that stays whole, the corner to begin with; nothing if it has to be cut.
+fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Option<usize> {
+    let n = ring.len();
+    if n == 3 {
+        return Some(0);
+    }
+    if n > MAX_CORNERS {
+        return None;
+    }
+    // Each corner's distance to the left of each edge, as an area on the plane: none may be outside.
+    let area =
+        |a: &Place, b: &Place, c: &Place| dot(cross(minus(b.at, a.at), minus(c.at, a.at)), normal);
+    let convex = (0..n).all(|i| {
+        let (a, b) = (&ring[i], &ring[(i + 1) % n]);
+        ring.iter().all(|c| area(a, b, c) <= 0.0)
+    });
+    let whole: f64 = -(1..n - 1)
+        .map(|i| area(&ring[0], &ring[i], &ring[i + 1]))
+        .sum::<f64>();
+    let height = |place: &Place| dot(minus(place.at, ring[0].at), normal);
+    let (low, high) = ring.iter().map(height).fold((0.0, 0.0), |(low, high), h| {
+        (f64::min(low, h), f64::max(high, h))
+    });
+    if !convex || high - low > FLATNESS * GRID {
+        return None;
+    }
+    // The texture plane goes through these three corners, counted from the first: the renderer's
+    // choice. They must not be on a line.
+    let anchors = |first: usize| [0, n / 3, 2 * n / 3].map(|i| (first + i) % n);
+    let anchored = |first: usize| {
+        let [a, b, c] = anchors(first).map(|i| &ring[i]);
+        -area(a, b, c)
+    };
+    let first = (0..n).max_by(|&a, &b| anchored(a).total_cmp(&anchored(b)))?;
+    if anchored(first) < LEAST_ANCHORED * whole {
+        return None;
+    }
+    let three = anchors(first);
+    let [a, b, c] = three.map(|i| &ring[i]);
+    let fits = ring.iter().zip(corners).all(|(place, corner)| {
+        // How much each of the three counts here.
+        let weights = [area(b, c, place), area(c, a, place), area(a, b, place)];
+        let total: f64 = weights.iter().sum();
+        let off = |value: fn(&Corner) -> i32| {
+            let planar: f64 = (0..3)
+                .map(|k| f64::from(value(&corners[three[k]])) * weights[k] / total)
+                .sum();
+            (planar - f64::from(value(corner))).abs()
+        };
+        off(|corner| corner.u).max(off(|corner| corner.v)) <= TEXEL_FIT * GRID
+    });
+    fits.then_some(first)
+}
+
+/// Cuts polygons into triangles.
+#[derive(Default)]
+struct Ears {
+    earcut: Earcut<f64>,
+    flat: Vec<[f64; 2]>,
+    cut: Vec<usize>,
+}
+
+impl Ears {
+    /// The triangles of a polygon, each with its corners in the polygon's order.
+    fn cut(&mut self, ring: &[Place]) -> Vec<[usize; 3]> {
+        let points: Vec<_> = ring.iter().map(|place| place.at).collect();
+        self.cut.clear();
+        if project3d_to_2d(&points, points.len(), &mut self.flat) {
+            let none: &[usize] = &[];
+            self.earcut
+                .earcut(self.flat.iter().copied(), none, &mut self.cut);
+        }
+        let (triangles, _) = self.cut.as_chunks::<3>();
+        let in_order = |triangle: &[usize; 3]| {
+            let mut triangle = *triangle;
+            triangle.sort_unstable();
+            triangle
+        };
+        triangles.iter().map(in_order).collect()
+    }
+}
+
+/// The unit normal on the side from which the ring is clockwise; none if it has no area.
+fn normal(ring: &[Place]) -> Option<[f64; 3]> {
+    let mut sum = [0.0; 3];
+    // From the first corner, so that the terms are as small as the polygon is.
+    for pair in ring.windows(2).skip(1) {
+        let term = cross(minus(pair[1].at, ring[0].at), minus(pair[0].at, ring[0].at));
+        sum = [0, 1, 2].map(|k| sum[k] + term[k]);
+    }
+    let length = length(sum);
+    (length > 0.0).then(|| sum.map(|k| k / length))
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| a[k] - b[k])
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| a[k] * b[k]).sum()
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| {
+        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+        a[i] * b[j] - a[j] * b[i]
+    })
+}
+
+fn length(a: [f64; 3]) -> f64 {
+    dot(a, a).sqrt()
+}

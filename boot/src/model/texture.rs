@@ -1,0 +1,189 @@
+//! From a PNG to the texels of a model.
+//!
+//! An OBJ's texture has no end: it repeats to all sides. A texture here is a rectangle of at most
+//! 256 texels a side, so it gets what the faces use of that plane and no more. Each face is moved by
+//! whole textures to where its coordinates begin in the first one. The rectangle around all of them
+//! is then cut from the plane, and the picture is scaled down until it fits. A model that uses a
+//! corner of its picture has that corner in full sharpness; one that repeats it four times has a
+//! quarter of it. It is never scaled up.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+use anyhow::{Context, ensure};
+use image::codecs::png::PngDecoder;
+use image::imageops::{FilterType, resize};
+use image::{DynamicImage, ImageDecoder, Rgb, RgbImage};
+
+use super::mesh::Polygon;
+use super::obj::BadLine;
+
+/// Longest side of a PNG that is read, in pixels: its pixels take up to half a GiB.
+pub const MAX_PIXELS: u32 = 8192;
+/// Most times that a face may repeat the texture: then four texels are left of it.
+const MAX_REPEATS: f64 = 64.0;
+/// So far a coordinate may be beyond a border of the texture, in textures, and is taken to mean the
+/// border: programs write 1.0001, and half a texel is not seen.
+const SLACK: f64 = 1.0 / 512.0;
+/// One texel of a corner's place.
+const TEXEL: f64 = 65_536.0;
+
+/// Reads a PNG.
+///
+/// # Errors
+/// A file that can't be read, is no whole PNG, or is larger than [`MAX_PIXELS`].
+pub fn read(path: &Path) -> anyhow::Result<RgbImage> {
+    let file = BufReader::new(File::open(path).context("it cannot be read")?);
+    // The size first: decoding takes the memory that the header asks for.
+    let decoder = PngDecoder::new(file).context("it is no PNG")?;
+    let (width, height) = decoder.dimensions();
+    ensure!(
+        width <= MAX_PIXELS && height <= MAX_PIXELS,
+        "it has {width} x {height} pixels; a texture has at most {MAX_PIXELS} a side"
+    );
+    let picture = DynamicImage::from_decoder(decoder).context("it is no whole PNG")?;
+    Ok(picture.into_rgb8())
+}
+
+/// What is cut from the plane of repeated pictures, along one axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Window {
+    /// Texels of the whole picture.
+    picture: u32,
+    /// The first texel that is cut, from the first picture's begin.
+    first: i64,
+    /// How many are cut, 1 to 256.
+    texels: u16,
+}
+
+impl Window {
+    /// For coordinates from `low` to `high`, in whole pictures of `pixels`.
+    fn around(low: f64, high: f64, pixels: u32) -> Self {
+        let mut picture = pixels.min((256.0 / (high - low).max(1e-9)) as u32).max(1);
+        loop {
+            let first = (low * f64::from(picture)).floor() as i64;
+            let end = (high * f64::from(picture)).ceil() as i64;
+            let texels = (end - first).max(1);
+            // The borders of texels lie about the window's: it may be one too many.
+            if texels <= 256 || picture == 1 {
+                return Self {
+                    picture,
+                    first,
+                    texels: texels.min(256) as u16,
+                };
+            }
+            picture -= 1;
+        }
+    }
+
+    /// The place of a coordinate, 16.16.
+    fn place(&self, coordinate: f64) -> i32 {
+        let texel = coordinate * f64::from(self.picture) - self.first as f64;
+        (texel.clamp(0.0, self.texels.into()) * TEXEL).round() as i32
+    }
+
+    /// The picture's pixel of a texel.
+    fn pixel(&self, texel: u32) -> u32 {
+        (self.first + i64::from(texel)).rem_euclid(self.picture.into()) as u32
+    }
+}
+
+/// The whole pictures that a polygon is moved by, so that it begins in the first one.
+fn begin(polygon: &Polygon, axis: usize) -> f64 {
+    let low = polygon.along(axis).fold(f64::INFINITY, f64::min);
+    (low + SLACK).floor()
+}
+
+/// From where to where a polygon is in the pictures, once it was moved.
+fn range(polygon: &Polygon, axis: usize) -> (f64, f64) {
+    let begin = begin(polygon, axis);
+    let moved = polygon.along(axis).map(|place| place - begin);
+    let (low, high) = moved.fold((f64::INFINITY, 0.0), |(low, high), place| {
+        (f64::min(low, place), f64::max(high, place))
+    });
+    let border = high.round();
+    let over = high > border && high - border <= SLACK;
+    (low.max(0.0), if over { border } else { high })
+}
+
+/// How a model's texture is cut from its picture.
+#[derive(Clone, Copy, Debug)]
+pub struct Layout {
+    across: Window,
+    down: Window,
+}
+
+impl Layout {
+    /// What the polygons use of a picture of `size` pixels.
+    ///
+    /// # Errors
+    /// The first polygon that repeats the picture more often than [`MAX_REPEATS`] times.
+    pub fn new(polygons: &[Polygon], (width, height): (u32, u32)) -> Result<Self, BadLine> {
+        let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
+        for polygon in polygons {
+            for (axis, (low, high)) in ranges.iter_mut().enumerate() {
+                let (from, to) = range(polygon, axis);
+                if to - from > MAX_REPEATS {
+                    let why = format!(
+                        "the face repeats the texture {:.0} times; at most {MAX_REPEATS} are left \
+                         of it at 256 texels",
+                        to - from
+                    );
+                    return Err(BadLine {
+                        line: polygon.line,
+                        why,
+                    });
+                }
+                *low = low.min(from);
+                *high = high.max(to);
+            }
+        }
+        let [(left, right), (top, bottom)] = ranges;
+        Ok(Self {
+            across: Window::around(left, right, width),
+            down: Window::around(top, bottom, height),
+        })
+    }
+
+    /// The texture's sides.
+    pub fn size(&self) -> (u16, u16) {
+        (self.across.texels, self.down.texels)
+    }
+
+    /// Where a polygon's corners are in the texture, 16.16 texels.
+    pub fn texels(&self, polygon: &Polygon) -> impl Iterator<Item = [i32; 2]> {
+        let [across, down] = [0, 1].map(|axis| begin(polygon, axis));
+        let u = polygon.along(0).map(move |u| self.across.place(u - across));
+        let v = polygon.along(1).map(move |v| self.down.place(v - down));
+        u.zip(v).map(|(u, v)| [u, v])
+    }
+
+    /// The texels, row by row. `pixel` has the picture's pixel in a column and a row, when it is
+    /// scaled to [`Layout::scaled`].
+    pub fn cut<T>(&self, pixel: impl Fn(u32, u32) -> T) -> Vec<T> {
+        let (columns, rows) = self.size();
+        let mut texels = Vec::with_capacity(usize::from(columns) * usize::from(rows));
+        for j in 0..u32::from(rows) {
+            let row =
+                (0..u32::from(columns)).map(|i| pixel(self.across.pixel(i), self.down.pixel(j)));
+            texels.extend(row);
+        }
+        texels
+    }
+
+    /// The size that the whole picture is scaled to; never larger than it is.
+    pub fn scaled(&self) -> (u32, u32) {
+        (self.across.picture, self.down.picture)
+    }
+
+    /// The texels of a picture, row by row.
+    pub fn cut_scaled(&self, picture: &RgbImage) -> Vec<Rgb<u8>> {
+        let (width, height) = self.scaled();
+        if picture.dimensions() == (width, height) {
+            return self.cut(|i, j| *picture.get_pixel(i, j));
+        }
+        let picture = resize(picture, width, height, FilterType::CatmullRom);
+        self.cut(|i, j| *picture.get_pixel(i, j))
+    }
+}
