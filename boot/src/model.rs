@@ -156,6 +156,7 @@ impl Model {
                 vertices: &solid.vertices,
                 corners: &solid.corners,
                 faces: &solid.faces,
+                convex: false,
             },
             texture: Texture::new(&texels, width, height)?,
             colours,

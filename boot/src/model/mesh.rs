@@ -25,8 +25,8 @@ use std::collections::HashMap;
 use anyhow::ensure;
 use earcut::Earcut;
 use earcut::utils3d::project3d_to_2d;
-use pack::{MAX_ALL_CORNERS, MAX_FACES};
-use scene::{Corner, Face, MAX_CORNERS, MAX_VERTICES, Vec3};
+use pack::MAX_ALL_CORNERS;
+use scene::{Corner, Face, MAX_CORNERS, MAX_FACES, MAX_VERTICES, Vec3};
 
 use super::obj::Obj;
 use super::texture::Layout;

@@ -42,7 +42,9 @@ mod error;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use modex::{HEIGHT, Palette};
 use scene::catalogue::{Colours, Entry};
-use scene::{Corner, Face, LIGHT_LEVELS, LightTable, MAX_CORNERS, MAX_EXTENT, MAX_VERTICES, Mesh};
+use scene::{
+    Corner, Face, LIGHT_LEVELS, LightTable, MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh,
+};
 use texmap::Texture;
 
 pub use arena::Arena;
@@ -52,8 +54,6 @@ pub use error::PackError;
 pub const MAGIC: [u8; 8] = *b"CBALPACK";
 /// Version of the format.
 pub const VERSION: u32 = 1;
-/// Most faces of a pack.
-pub const MAX_FACES: usize = 8192;
 /// Most corners of all its faces: those of as many triangles.
 pub const MAX_ALL_CORNERS: usize = 3 * MAX_FACES;
 /// Longest pack in bytes.
@@ -135,6 +135,7 @@ impl Parts<'_> {
             vertices,
             corners,
             faces,
+            ..
         } = self.mesh;
         let counts = [vertices.len(), corners.len(), faces.len()];
         let sides = [self.texture.width(), self.texture.height()];
@@ -333,6 +334,8 @@ impl<'p> Pack<'p> {
             vertices: arena::fill(vertices, self.vertices.iter().map(vertex)),
             corners: arena::fill(corners, self.corners.iter().map(corner)),
             faces: arena::fill(faces, faces_of),
+            // Nobody vouches for a file's solid.
+            convex: false,
         };
         Entry::loaded(mesh, self.texture, self.colours, self.background)
     }
@@ -551,6 +554,7 @@ mod tests {
                 vertices: &vertices,
                 corners: &corners,
                 faces: &faces,
+                convex: false,
             },
             texture: Texture::new(&texels, 256, 256).unwrap(),
             colours,

@@ -11,7 +11,7 @@ use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 /// Most vertices of a mesh.
 pub const MAX_VERTICES: usize = 4096;
 /// Most faces of a mesh that is not convex: each is known by a number until the picture is drawn.
-pub const MAX_FACES: usize = 2048;
+pub const MAX_FACES: usize = 8192;
 /// Column jobs that are collected before they are drawn.
 pub const MAX_JOBS: usize = 4096;
 /// Room for a scene's textures, each padded and once per light level: one of the largest.
