@@ -149,6 +149,12 @@ impl Card for Emulated<'_> {
                         self.picture = Some(picture);
                         self.drawn_by = self.mapper;
                     }
+                    Command::ShowAt(_) => {
+                        self.picture = Picture::parse(self.state("picture")?.split(' '));
+                        self.scene = self.state("scene")?;
+                        self.mapper = Word::new(&self.state("mapper")?);
+                        self.drawn_by = self.mapper;
+                    }
                     _ => {}
                 }
                 Ok(answer)

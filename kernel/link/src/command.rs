@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::{FrameError, unframe};
+use crate::{Change, FrameError, unframe};
 
 /// A command, as it stands on a line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,9 +15,19 @@ pub enum Command {
     /// `show PICTURE`: draw it on the next page, flip, and answer when the flip holds. A show
     /// that runs is stopped first, its settings as they are.
     Show(Picture),
+    /// `show at TICK`: the same with the picture that the show has, or had, at a tick: that of its
+    /// log. Scene, mapper and order are then those of that tick.
+    ShowAt(u32),
     /// `scene NAME`, `mapper NAME`, `order NAME`: from the next picture on. Without a name: which there are, and
     /// which is set.
     Set(Setting, Option<Word>),
+    /// `steer CHANGE`: of the running show, now. `steer TICK CHANGE`: noted in the log of a held one,
+    /// for `show at`; ticks may not go back.
+    Steer(Option<u32>, Change),
+    /// `log`: what was steered, as commands that a held show takes.
+    Log,
+    /// `keys`: which key does what.
+    Keys,
     /// `dump` or `dump all`: what the card holds, read back from it, as [`crate::dump`] writes it.
     Dump(Content),
     /// `checksums` or `checksums all`: the CRC-32 of the same, and no byte of it.
@@ -73,13 +83,16 @@ impl Picture {
                     distance: hex()?,
                 }
             }
-            number if number.bytes().all(|b| b.is_ascii_digit()) => {
-                Self::Frame(number.parse().ok()?)
-            }
-            _ => return None,
+            number => Self::Frame(decimal(number)?),
         };
         words.next().is_none().then_some(picture)
     }
+}
+
+/// A number of digits alone: `parse` would take a sign.
+fn decimal(word: &str) -> Option<u32> {
+    let digits = word.bytes().all(|b| b.is_ascii_digit());
+    word.parse().ok().filter(|_| digits)
 }
 
 impl fmt::Display for Picture {
@@ -114,6 +127,12 @@ impl Setting {
         ("mapper", Self::Mapper),
         ("order", Self::Order),
     ];
+
+    /// The setting of a word.
+    pub fn parse(word: &str) -> Option<Self> {
+        let known = Self::ALL.iter().find(|(known, _)| *known == word);
+        known.map(|&(_, setting)| setting)
+    }
 }
 
 impl fmt::Display for Setting {
@@ -235,8 +254,9 @@ impl fmt::Display for CommandError<'_> {
         match self {
             Self::Unknown(word) => write!(
                 f,
-                "no command '{word}'; there are hold, run, show PICTURE, scene NAME, mapper NAME, \
-                 order NAME, dump, checksums, registers, counts, state, version, fail KIND, leave"
+                "no command '{word}'; there are hold, run, show PICTURE, show at TICK, scene NAME, \
+                 mapper NAME, order NAME, steer CHANGE, steer TICK CHANGE, log, keys, dump, checksums, \
+                 registers, counts, state, version, fail KIND, leave"
             ),
             Self::Arguments { command, takes } => write!(f, "'{command}' takes {takes}"),
             Self::Checksum(error) => error.fmt(f),
@@ -259,10 +279,29 @@ impl Command {
         let command = words.next().unwrap_or("");
         let takes = |takes| CommandError::Arguments { command, takes };
         if command == "show" {
-            let picture = Picture::parse(words);
-            return picture.map(Self::Show).ok_or(takes(
+            let at = words.clone().next() == Some("at");
+            let shown = match at {
+                true => {
+                    words.next();
+                    let tick = words.next().and_then(decimal);
+                    tick.filter(|_| words.next().is_none()).map(Self::ShowAt)
+                }
+                false => Picture::parse(words).map(Self::Show),
+            };
+            return shown.ok_or(takes(
                 "a frame number, 0 to 4294967295, or 'pose' and four hex numbers: \
-                 yaw, pitch, roll, distance",
+                 yaw, pitch, roll, distance, or 'at' and a tick",
+            ));
+        }
+        if command == "steer" {
+            let tick = words.clone().next().and_then(decimal);
+            if tick.is_some() {
+                words.next();
+            }
+            let change = Change::parse(words).map(|change| Self::Steer(tick, change));
+            return change.ok_or(takes(
+                "an action ('keys' lists them), or scene, mapper or order and a name; \
+                 for a held show a tick before it, 0 to 4294967295",
             ));
         }
         let argument = words.next();
@@ -274,7 +313,7 @@ impl Command {
             Some("all") => Ok(Content::Memory),
             Some(_) => Err(takes("nothing, or 'all'")),
         };
-        if let Some(&(_, setting)) = Setting::ALL.iter().find(|(word, _)| *word == command) {
+        if let Some(setting) = Setting::parse(command) {
             let word = argument.map(|argument| {
                 Word::new(argument).ok_or(takes("nothing, or a name; alone it lists them"))
             });
@@ -291,6 +330,8 @@ impl Command {
             }
             "hold" => Self::Hold,
             "run" => Self::Run,
+            "log" => Self::Log,
+            "keys" => Self::Keys,
             "registers" => Self::Registers,
             "counts" => Self::Counts,
             "state" => Self::State,
@@ -311,6 +352,11 @@ impl fmt::Display for Command {
             Self::Hold => f.write_str("hold"),
             Self::Run => f.write_str("run"),
             Self::Show(picture) => write!(f, "show {picture}"),
+            Self::ShowAt(tick) => write!(f, "show at {tick}"),
+            Self::Steer(None, change) => write!(f, "steer {change}"),
+            Self::Steer(Some(tick), change) => write!(f, "steer {tick} {change}"),
+            Self::Log => f.write_str("log"),
+            Self::Keys => f.write_str("keys"),
             Self::Set(setting, None) => write!(f, "{setting}"),
             Self::Set(setting, Some(word)) => write!(f, "{setting} {word}"),
             Self::Dump(Content::Page) => f.write_str("dump"),
@@ -334,6 +380,7 @@ impl fmt::Display for Command {
 mod tests {
     extern crate std;
     use super::*;
+    use crate::Action;
     use std::string::ToString;
     use std::vec::Vec;
 
@@ -350,6 +397,8 @@ mod tests {
                 roll: 0x0123_abcd,
                 distance: 1,
             }),
+            Command::ShowAt(0),
+            Command::ShowAt(u32::MAX),
             Command::Set(Setting::Mapper, None),
             Command::Set(Setting::Order, Word::new("planes")),
             Command::Set(Setting::Mapper, Word::new("within-1/256")),
@@ -357,12 +406,19 @@ mod tests {
             Command::Dump(Content::Memory),
             Command::Checksums(Content::Page),
             Command::Checksums(Content::Memory),
+            Command::Log,
+            Command::Keys,
             Command::Registers,
             Command::Counts,
             Command::State,
             Command::Version,
             Command::Leave,
         ];
+        let mapper = Change::Set(Setting::Mapper, Word::new("within-1/256").unwrap());
+        let actions = Action::ALL.map(|(_, action)| Change::Act(action));
+        for change in actions.into_iter().chain([mapper]) {
+            commands.extend([None, Some(0), Some(u32::MAX)].map(|t| Command::Steer(t, change)));
+        }
         commands.extend(Fault::ALL.map(|(_, fault)| Command::Fail(fault)));
         for command in commands {
             let mut framed = Vec::new();
@@ -396,6 +452,16 @@ mod tests {
             ("show pose 1 2 3 4 5", "four hex numbers"),
             ("show pose +1 2 3 4", "four hex numbers"),
             ("show pose 1 2 3 123456789", "four hex numbers"),
+            ("show at", "'at' and a tick"),
+            ("show at -1", "'at' and a tick"),
+            ("show at 1 2", "'at' and a tick"),
+            ("steer", "an action ('keys' lists them)"),
+            ("steer 5", "an action"),
+            ("steer yaw", "an action"),
+            ("steer stop 5", "an action"),
+            ("steer 4294967296 stop", "an action"),
+            ("steer 5 mapper", "an action"),
+            ("log it", "'log' takes nothing"),
             ("mapper affine exact", "at most one word"),
             ("mapper a-name-that-is-much-too-long", "nothing, or a name"),
             ("dump it", "nothing, or 'all'"),

@@ -21,21 +21,25 @@
 //! | `hold` | |
 //! | `run` | |
 //! | `show 480`, `show pose 0 13e93e93 0ccccccc 2f333` | `page 1` |
+//! | `show at 99` | the same |
 //! | `scene cube`, `mapper exact`, `order planes` | |
 //! | `scene`, `mapper`, `order` | a line for each that there is: `exact perspective; ...`, the one that is set begins with `*` |
+//! | `steer faster`, `steer 99 mapper exact` | |
+//! | `log` | `scene ball`, `mapper shifts`, `order polygons`, and a line for each change: `steer 99 faster`; after a log that is full `lost 3`, and how many were not noted |
+//! | `keys` | a line for each key: `F finer: half the error of within-T` |
 //! | `dump`, `dump all` | a [`dump`] |
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
 //! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
 //! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `page 1 start 4b00` |
-//! | `version` | `crystal-ball 0.1.0 protocol 4 dump 3` |
+//! | `version` | `crystal-ball 0.1.0 protocol 5 dump 3` |
 //! | `fail KIND` | none: the kernel breaks in the way that is named ([`Fault`]) |
 //! | `leave` | after the `ok` QEMU ends |
 //!
 //! Commands that come while an answer is under way are answered after it, in their order. A host
 //! that does not read is waited for. Between answers the kernel says on its own:
 //!
-//! - `hello crystal-ball VERSION protocol 4`: the boot loader has handed over;
+//! - `hello crystal-ball VERSION protocol 5`: the boot loader has handed over;
 //! - `loaded pack 1a2b3c4d`, with the pack's checksum, or `refused pack: ...`, and why: if the
 //!   boot loader brought a ramdisk, right after it;
 //! - `running`: the first picture is on the screen;
@@ -43,17 +47,19 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod action;
 mod command;
 pub mod dump;
 mod frame;
 mod lines;
 
+pub use action::{Action, Change};
 pub use command::{Command, CommandError, Content, Fault, Picture, Setting, Word};
 pub use frame::{Checksum, FrameError, unframe, write_line};
 pub use lines::{Lines, Noise};
 
 /// The protocol's version, in the kernel's first line.
-pub const PROTOCOL: u32 = 4;
+pub const PROTOCOL: u32 = 5;
 /// Longest line in bytes, its checksum included, its end not: 320 pixels of a dump with their
 /// label take 657.
 pub const MAX_LINE: usize = 700;

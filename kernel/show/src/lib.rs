@@ -4,21 +4,34 @@
 //! when it does not: the motion keeps its pace. Held, it draws what `show` names and touches no
 //! video memory between commands, so that what is on the screen can be taken as evidence.
 //!
+//! A running show is steered, by keys and by commands, and notes that ([`mod@steering`]): held, it
+//! draws the picture of any tick of what was noted.
+//!
 //! It knows nothing of the machine: a card behind a [`modex::Bus`], bytes in, lines out, and the
 //! tick as an argument. The kernel gives it the bare machine's card and its serial line, a test
 //! the emulated card and a list; the same commands then bring the same answers.
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod keys;
+mod steering;
+
 use core::fmt;
 
 use link::dump::{self, Header};
-use link::{Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting, Word};
+use link::{
+    Action, Change, Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting,
+    Word,
+};
 use modex::{Bus, Counted, HEIGHT, ModeX, Offscreen, Readback, Tally, WIDTH};
 use pack::{Arena, Pack};
-use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+use scene::catalogue::{Entry, MAX_TEXELS};
 use scene::{Pose, Stage, Storage};
 use texmap::{Mapper, Order, Stats};
+
+use keys::Keyboard;
+pub use keys::{KEYS, Key};
+use steering::{Log, NotNoted, Notes, Scenes, State};
 
 /// The program's version, as its first line and `version` tell it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -33,6 +46,7 @@ pub struct Memory {
     texels: [u8; MAX_TEXELS],
     storage: Storage,
     offscreen: Offscreen,
+    notes: Notes,
 }
 
 impl Memory {
@@ -43,6 +57,7 @@ impl Memory {
             texels: [0; MAX_TEXELS],
             storage: Storage::new(),
             offscreen: Offscreen::new(),
+            notes: Log::NOTES,
         }
     }
 }
@@ -77,10 +92,15 @@ struct Pace {
 #[derive(Debug)]
 pub struct Show<'a, B> {
     card: ModeX<Counted<B>>,
-    /// The model that was loaded, and its pack's checksum.
-    model: Option<(Entry<'a>, u32)>,
-    /// The scene on the stage, and where its texture is painted.
-    entry: Entry<'a>,
+    /// The checksum of the pack that the loaded model is of.
+    pack: Option<u32>,
+    /// What the next picture depends on, and what that came from.
+    state: State<'a>,
+    log: Log<'a>,
+    keyboard: Keyboard,
+    /// The keyboard's codes: taken, and lost before.
+    codes: (u32, u32),
+    /// Where the scene's texture is painted.
     texels: &'a mut [u8; MAX_TEXELS],
     stage: Stage<'a>,
     offscreen: &'a mut Offscreen,
@@ -101,13 +121,16 @@ impl<'a, B: Bus> Show<'a, B> {
     /// If the card does not read back as it was set: it can't be drawn on.
     pub fn new(memory: &'a mut Memory, bus: B, pack: Option<&Pack<'a>>) -> Self {
         let arena = &mut memory.model;
-        let model = pack.map(|pack| (pack.entry(arena), pack.checksum()));
-        let entry = default_scene(model);
-        let textures = [entry.paint(&mut memory.texels)];
-        let stage = Stage::new(&mut memory.storage, entry.scene(&textures));
+        let scenes = Scenes::new(pack.map(|pack| pack.entry(arena)));
+        let state = State::of(scenes, scenes.default());
+        let textures = [state.entry.paint(&mut memory.texels)];
+        let stage = Stage::new(&mut memory.storage, state.entry.scene(&textures));
         Self {
-            model,
-            entry,
+            pack: pack.map(Pack::checksum),
+            state,
+            log: Log::new(state, &mut memory.notes),
+            keyboard: Keyboard::new(),
+            codes: (0, 0),
             texels: &mut memory.texels,
             card: expect(ModeX::set(Counted::new(bus), stage.palette())),
             stage,
@@ -132,7 +155,7 @@ impl<'a, B: Bus> Show<'a, B> {
 
     /// Shows the running show's picture of `tick`.
     pub fn present(&mut self, tick: u32, out: &mut Out<'_>) {
-        self.draw(Picture::Frame(tick), &self.entry.pose(tick));
+        self.draw_at(tick);
         let Some(pace) = &mut self.pace else { return };
         let before = pace.last.replace(tick);
         pace.late += u32::from(before.is_some_and(|before| tick.wrapping_sub(before) > 1));
@@ -140,6 +163,22 @@ impl<'a, B: Bus> Show<'a, B> {
         if before.is_none() {
             out(format_args!("{RUNNING}"));
         }
+    }
+
+    /// Takes a code of the keyboard, scan code set 1. A held show is not steered by keys.
+    pub fn key(&mut self, code: u8, tick: u32) {
+        self.codes.0 = self.codes.0.wrapping_add(1);
+        if let Some(action) = self.keyboard.push(code)
+            && self.pace.is_some()
+        {
+            // An action has no name that could be wrong.
+            let _ = self.steer(tick, Change::Act(action));
+        }
+    }
+
+    /// Says how many codes the machine could not keep until they were fetched, since its start.
+    pub fn set_lost_keys(&mut self, codes: u32) {
+        self.codes.1 = codes;
     }
 
     /// Takes a byte of the serial line; with the one that ends a line, obeys it.
@@ -164,14 +203,21 @@ impl<'a, B: Bus> Show<'a, B> {
     pub fn obey(&mut self, command: Command, tick: u32, out: &mut Out<'_>) -> Option<Request> {
         match command {
             Command::Hold => {
-                self.stage.set_mapper(Mapper::default());
-                self.stage.set_order(Order::default());
-                self.set_scene(default_scene(self.model));
+                let scenes = self.state.scenes;
+                let state = State::of(scenes, scenes.default());
+                self.log.restart(state);
+                self.adopt(state);
                 self.hold();
             }
-            Command::Run => self.pace = Some(Pace::default()),
+            Command::Run => {
+                if self.pace.is_none() {
+                    self.state = self.state.unsteered();
+                    self.log.restart(self.state);
+                }
+                self.pace = Some(Pace::default());
+            }
             Command::Show(picture) => {
-                let Some(pose) = pose(&self.entry, picture) else {
+                let Some(pose) = pose(&self.state.entry, picture) else {
                     let most = Pose::MAX_DISTANCE;
                     out(format_args!("{ERROR} a distance is 0 to {most:08x}"));
                     return None;
@@ -180,16 +226,29 @@ impl<'a, B: Bus> Show<'a, B> {
                     self.hold();
                 }
                 self.draw(picture, &pose);
-                self.card.settle();
-                out(format_args!("page {}", self.card.shown_page()));
+                self.tell_page(out);
             }
-            Command::Set(setting, None) => self.list(setting, out),
-            Command::Set(setting, Some(name)) => {
-                if self.set(setting, &name).is_none() {
+            Command::ShowAt(tick) => {
+                let Some(state) = self.log.state(tick) else {
                     out(format_args!(
-                        "{ERROR} no {setting} '{name}'; '{setting}' alone lists them"
+                        "{ERROR} the log is full, and changes before tick {tick} are not in it"
                     ));
                     return None;
+                };
+                if self.pace.is_some() {
+                    self.hold();
+                }
+                self.adopt(state);
+                self.draw_at(tick);
+                self.tell_page(out);
+            }
+            Command::Set(setting, None) => self.list(setting, out),
+            Command::Set(setting, Some(name)) => self.set(setting, name, tick, out)?,
+            Command::Steer(at, change) => self.obey_steer(at, change, tick, out)?,
+            Command::Log => self.tell_log(out),
+            Command::Keys => {
+                for key in KEYS {
+                    out(format_args!("{} {}: {}", key.name, key.action, key.about));
                 }
             }
             Command::Dump(content) => {
@@ -244,34 +303,110 @@ impl<'a, B: Bus> Show<'a, B> {
         self.mapper = self.stage.mapper();
     }
 
-    /// Sets something by name; nothing if there is no such name.
-    fn set(&mut self, setting: Setting, name: &Word) -> Option<()> {
-        match setting {
-            Setting::Scene => {
-                let named = self.scenes().find(|entry| entry.name == name.as_str())?;
-                self.set_scene(named);
-                self.reset();
-            }
-            Setting::Mapper => self.stage.set_mapper(Mapper::parse(name.as_str())?),
-            Setting::Order => self.stage.set_order(Order::parse(name.as_str())?),
+    /// Draws the picture of a tick on the next page, and flips.
+    fn draw_at(&mut self, tick: u32) {
+        let pose = self.state.pose(tick);
+        let own = pose == self.state.entry.pose(tick);
+        self.draw(
+            if own {
+                Picture::Frame(tick)
+            } else {
+                name(&pose)
+            },
+            &pose,
+        );
+    }
+
+    /// Changes the running show at the first tick that has no picture yet, and notes it.
+    fn steer(&mut self, tick: u32, change: Change) -> Result<(), steering::Unknown> {
+        let drawn = self.pace.is_some_and(|pace| pace.last == Some(tick));
+        let tick = if drawn { tick.wrapping_add(1) } else { tick };
+        let mut next = self.state;
+        let changed = next.change(tick, &change)?;
+        self.adopt(next);
+        match change {
+            // What was before makes no difference any more.
+            Change::Act(Action::Reset) => self.log.restart(next),
+            _ if changed => self.log.keep(tick, change),
+            _ => {}
         }
-        Some(())
+        Ok(())
     }
 
-    /// Every scene that can be set.
-    fn scenes(&self) -> impl Iterator<Item = Entry<'a>> + use<'a, B> {
-        let model = self.model.map(|(entry, _)| entry);
-        CATALOGUE.iter().copied().chain(model)
+    /// Carries `steer` out; nothing if that was refused, and told.
+    fn obey_steer(
+        &mut self,
+        at: Option<u32>,
+        change: Change,
+        tick: u32,
+        out: &mut Out<'_>,
+    ) -> Option<()> {
+        let noted = match (self.pace.is_some(), at) {
+            (true, None) => return known(self.steer(tick, change), change, out),
+            (true, Some(_)) => {
+                out(format_args!(
+                    "{ERROR} the show runs: it is steered now, without a tick"
+                ));
+                return None;
+            }
+            (false, None) => {
+                out(format_args!(
+                    "{ERROR} the show is held: a tick has to be said, for 'show at'"
+                ));
+                return None;
+            }
+            (false, Some(at)) => {
+                let mut state = self.state.unsteered();
+                known(state.change(at, &change).map(drop), change, out)?;
+                self.log.note(at, change)
+            }
+        };
+        match noted {
+            Ok(()) => return Some(()),
+            Err(NotNoted::Before(last)) => out(format_args!(
+                "{ERROR} a log's ticks do not go back, and the last one is {last}"
+            )),
+            Err(NotNoted::Full) => out(format_args!(
+                "{ERROR} the log is full: it holds {} changes",
+                Log::MAX
+            )),
+        }
+        None
     }
 
-    /// Puts a scene on the stage; the card has to be reset then, for its palette and background.
-    fn set_scene(&mut self, entry: Entry<'a>) {
-        if entry.name != self.entry.name {
-            self.entry = entry;
+    /// Sets something by name; nothing if there is no such name, and that was told.
+    fn set(&mut self, setting: Setting, name: Word, tick: u32, out: &mut Out<'_>) -> Option<()> {
+        let change = Change::Set(setting, name);
+        let set = match self.pace {
+            Some(_) => self.steer(tick, change),
+            None => {
+                let mut next = self.state;
+                next.change(tick, &change).map(|_| {
+                    self.adopt(next);
+                    // It is known, then.
+                    let _ = self.log.start().change(tick, &change);
+                    if setting == Setting::Scene {
+                        self.reset();
+                    }
+                })
+            }
+        };
+        known(set, change, out)
+    }
+
+    /// Has the next picture drawn as `state` says. For another scene the card is reset, since palette
+    /// and background are others.
+    fn adopt(&mut self, state: State<'a>) {
+        let entry = state.entry;
+        self.stage.set_mapper(state.mapper);
+        self.stage.set_order(state.order);
+        if entry.name != self.state.entry.name {
             let textures = [entry.paint(self.texels)];
             self.stage.set(entry.scene(&textures));
             self.offscreen.forget();
+            self.reset();
         }
+        self.state = state;
     }
 
     /// Tells what a setting can be set to.
@@ -282,8 +417,8 @@ impl<'a, B: Bus> Show<'a, B> {
         };
         match setting {
             Setting::Scene => {
-                for entry in self.scenes() {
-                    tell(entry.name == self.entry.name, entry.name, entry.about);
+                for entry in self.state.scenes.all() {
+                    tell(entry.name == self.state.entry.name, entry.name, entry.about);
                 }
             }
             Setting::Mapper => {
@@ -320,15 +455,33 @@ impl<'a, B: Bus> Show<'a, B> {
         Header {
             content,
             scene: self.stage.name(),
-            pack: self
-                .model
-                .filter(|(entry, _)| entry.name == self.stage.name())
-                .map(|(_, checksum)| checksum),
+            pack: self.pack.filter(|_| self.stage.name() == Entry::LOADED),
             mapper: Word::of(self.mapper).expect("a mapper's name is a word"),
             picture: self.picture,
             start: self.card.start_address(),
             width: WIDTH as u16,
             height: HEIGHT as u16,
+        }
+    }
+
+    /// Waits until the last flip holds, and tells which page is on the screen.
+    fn tell_page(&mut self, out: &mut Out<'_>) {
+        self.card.settle();
+        out(format_args!("page {}", self.card.shown_page()));
+    }
+
+    /// Tells the log as the commands that bring it back.
+    fn tell_log(&mut self, out: &mut Out<'_>) {
+        let start = *self.log.start();
+        out(format_args!("{} {}", Setting::Scene, start.entry.name));
+        out(format_args!("{} {}", Setting::Mapper, start.mapper));
+        out(format_args!("{} {}", Setting::Order, start.order));
+        for (tick, change) in self.log.changes() {
+            out(format_args!("{}", Command::Steer(Some(tick), *change)));
+        }
+        match self.log.lost() {
+            0 => {}
+            lost => out(format_args!("lost {lost}")),
         }
     }
 
@@ -367,6 +520,8 @@ impl<'a, B: Bus> Show<'a, B> {
                 "pace pictures {pictures} late {late} tick {tick}"
             ));
         }
+        let (taken, lost) = self.codes;
+        out(format_args!("keys taken {taken} lost {lost}"));
     }
 
     fn tell_state(&mut self, tick: u32, out: &mut Out<'_>) {
@@ -389,11 +544,6 @@ impl<'a, B: Bus> Show<'a, B> {
     }
 }
 
-/// The scene of a show that was not told another one.
-fn default_scene<'a>(model: Option<(Entry<'a>, u32)>) -> Entry<'a> {
-    model.map_or(CATALOGUE[0], |(entry, _)| entry)
-}
-
 /// The pose of a scene's picture; none if it is outside the legal range.
 pub fn pose(scene: &Entry<'_>, picture: Picture) -> Option<Pose> {
     match picture {
@@ -412,6 +562,26 @@ pub fn pose(scene: &Entry<'_>, picture: Picture) -> Option<Pose> {
                 distance,
             })
         }
+    }
+}
+
+/// Tells if a change was none, since it names nothing that there is.
+fn known(changed: Result<(), steering::Unknown>, change: Change, out: &mut Out<'_>) -> Option<()> {
+    if let (Err(steering::Unknown), Change::Set(setting, name)) = (changed, change) {
+        out(format_args!(
+            "{ERROR} no {setting} '{name}'; '{setting}' alone lists them"
+        ));
+    }
+    changed.ok()
+}
+
+/// The name of a pose.
+fn name(pose: &Pose) -> Picture {
+    Picture::Pose {
+        yaw: pose.yaw,
+        pitch: pose.pitch,
+        roll: pose.roll,
+        distance: pose.distance.unsigned_abs(),
     }
 }
 

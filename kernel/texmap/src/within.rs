@@ -54,6 +54,19 @@ impl Tolerance {
         Self::new(numerator.parse().ok()?, denominator.parse().ok()?)
     }
 
+    /// A texel.
+    pub const TEXEL: Self = Self::part(0);
+
+    /// Half of it, if that is legal.
+    pub const fn half(self) -> Option<Self> {
+        Self::new(self.0, 1 << 17)
+    }
+
+    /// Twice as much, if that is legal.
+    pub const fn double(self) -> Option<Self> {
+        Self::new(2 * self.0, 1 << 16)
+    }
+
     /// 1 / 2^`bits` texel; at most 16 bits.
     pub(crate) const fn part(bits: u32) -> Self {
         Self(1 << (16 - bits))

@@ -1,0 +1,266 @@
+//! Keys: scancodes in, actions out.
+//!
+//! Codes are scan code set 1, as the keyboard controller hands them on. A key is known by its place:
+//! the letters are those of a US keyboard there.
+//!
+//! A key that is held down repeats. What turns, approaches or steps takes the repeats, and all else
+//! only the push. Codes can get lost, where a machine is too busy to take them: a release that is
+//! lost costs the next push of that key, since it looks like a repeat, and no more.
+
+use core::fmt;
+
+use link::Action;
+use pc_keyboard::{KeyCode, KeyState, ScancodeSet, ScancodeSet1};
+
+/// What a key does.
+#[derive(Clone, Copy, Debug)]
+pub struct Key {
+    /// The keys' name, for people.
+    pub name: &'static str,
+    /// The key, and another one that does the same.
+    codes: [KeyCode; 2],
+    /// What it does.
+    pub action: Action,
+    /// A line about it, for people.
+    pub about: &'static str,
+}
+
+/// Every key that does something, each action once.
+pub const KEYS: &[Key] = &[
+    key(
+        "Left",
+        [KeyCode::ArrowLeft; 2],
+        Action::YawLeft,
+        "turn to the left",
+    ),
+    key(
+        "Right",
+        [KeyCode::ArrowRight; 2],
+        Action::YawRight,
+        "turn to the right",
+    ),
+    key("Up", [KeyCode::ArrowUp; 2], Action::PitchUp, "turn up"),
+    key(
+        "Down",
+        [KeyCode::ArrowDown; 2],
+        Action::PitchDown,
+        "turn down",
+    ),
+    key("A", [KeyCode::A; 2], Action::RollLeft, "lean to the left"),
+    key("D", [KeyCode::D; 2], Action::RollRight, "lean to the right"),
+    key(
+        "+",
+        [KeyCode::OemPlus, KeyCode::NumpadAdd],
+        Action::Faster,
+        "faster",
+    ),
+    key(
+        "-",
+        [KeyCode::OemMinus, KeyCode::NumpadSubtract],
+        Action::Slower,
+        "slower",
+    ),
+    key(
+        "0",
+        [KeyCode::Key0, KeyCode::Numpad0],
+        Action::Stop,
+        "stop turning",
+    ),
+    key(
+        "Space",
+        [KeyCode::Spacebar; 2],
+        Action::Pause,
+        "pause, and go on",
+    ),
+    key(
+        "S",
+        [KeyCode::S; 2],
+        Action::Step,
+        "pause, and a tick at a time",
+    ),
+    key("PgUp", [KeyCode::PageUp; 2], Action::Nearer, "nearer"),
+    key("PgDn", [KeyCode::PageDown; 2], Action::Farther, "farther"),
+    key("N", [KeyCode::N; 2], Action::NextScene, "next scene"),
+    key("M", [KeyCode::M; 2], Action::NextMapper, "next mapper"),
+    key(
+        "B",
+        [KeyCode::B; 2],
+        Action::LastMapper,
+        "the mapper before",
+    ),
+    key(
+        "F",
+        [KeyCode::F; 2],
+        Action::Finer,
+        "finer: half the error of within-T",
+    ),
+    key(
+        "C",
+        [KeyCode::C; 2],
+        Action::Coarser,
+        "coarser: twice the error",
+    ),
+    key(
+        "O",
+        [KeyCode::O; 2],
+        Action::NextOrder,
+        "next order: polygons, planes, buffer",
+    ),
+    key(
+        "R",
+        [KeyCode::R; 2],
+        Action::Reset,
+        "reset: all but the scene",
+    ),
+];
+
+const fn key(name: &'static str, codes: [KeyCode; 2], action: Action, about: &'static str) -> Key {
+    Key {
+        name,
+        codes,
+        action,
+        about,
+    }
+}
+
+/// Whether a key that is held down does it again and again.
+fn repeats(action: Action) -> bool {
+    matches!(
+        action,
+        Action::YawLeft
+            | Action::YawRight
+            | Action::PitchUp
+            | Action::PitchDown
+            | Action::RollLeft
+            | Action::RollRight
+            | Action::Faster
+            | Action::Slower
+            | Action::Step
+            | Action::Nearer
+            | Action::Farther
+    )
+}
+
+/// A keyboard: which keys are down.
+pub(crate) struct Keyboard {
+    set: ScancodeSet1,
+    /// A bit for each [`KeyCode`].
+    down: u128,
+}
+
+impl Keyboard {
+    /// No key is down.
+    pub const fn new() -> Self {
+        Self {
+            set: ScancodeSet1::new(),
+            down: 0,
+        }
+    }
+
+    /// Takes a code; with the last one of a push that does something, what that is.
+    pub fn push(&mut self, code: u8) -> Option<Action> {
+        // A code that is none is passed over: the next one starts anew.
+        let event = self.set.advance_state(code).ok()??;
+        let bit = 1u128 << (event.code as u8 & 127);
+        let again = self.down & bit != 0;
+        match event.state {
+            KeyState::Down => self.down |= bit,
+            KeyState::Up | KeyState::SingleShot => {
+                self.down &= !bit;
+                return None;
+            }
+        }
+        let key = KEYS.iter().find(|key| key.codes.contains(&event.code))?;
+        (!again || repeats(key.action)).then_some(key.action)
+    }
+}
+
+impl fmt::Debug for Keyboard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Keyboard({:x})", self.down)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    /// Codes of set 1: a letter's push is one byte, its release the same with bit 7; an arrow's has
+    /// E0 before it.
+    const A: u8 = 0x1E;
+    const M: u8 = 0x32;
+    const LEFT: u8 = 0x4B;
+    const UP: u8 = 0x80;
+    const EXTENDED: u8 = 0xE0;
+
+    fn actions(keyboard: &mut Keyboard, codes: &[u8]) -> Vec<Action> {
+        codes
+            .iter()
+            .filter_map(|&code| keyboard.push(code))
+            .collect()
+    }
+
+    #[test]
+    fn every_action_has_a_key_and_no_key_two() {
+        for (name, action) in Action::ALL {
+            let with = KEYS.iter().filter(|key| key.action == action);
+            assert_eq!(with.count(), 1, "{name}");
+        }
+        let mut codes: Vec<_> = KEYS.iter().flat_map(|key| key.codes).collect();
+        let all = codes.len();
+        codes.sort();
+        codes.dedup();
+        let twins = KEYS.iter().filter(|key| key.codes[0] == key.codes[1]);
+        assert_eq!(codes.len(), all - twins.count());
+        // The bits of `Keyboard::down`.
+        assert!((KeyCode::Unknown as u8) < 128);
+    }
+
+    #[test]
+    fn repeats_turn_on_and_toggle_nothing() {
+        let mut keyboard = Keyboard::new();
+        let left = [EXTENDED, LEFT];
+        let held = actions(&mut keyboard, &[left; 5].concat());
+        assert_eq!(held, [Action::YawLeft; 5]);
+        // Another key meanwhile: repeats are its own from then on.
+        let held = actions(&mut keyboard, &[M, M, M, A, A, M | UP, A, M]);
+        let [m, a] = [Action::NextMapper, Action::RollLeft];
+        assert_eq!(held, [m, a, a, a, m]);
+        let released = actions(&mut keyboard, &[EXTENDED, LEFT | UP, A | UP, M | UP, M]);
+        assert_eq!(released, [m]);
+    }
+
+    #[test]
+    fn what_is_lost_costs_a_push_at_most() {
+        // The release was lost.
+        let mut keyboard = Keyboard::new();
+        assert_eq!(
+            actions(&mut keyboard, &[M, M, M | UP, M]),
+            [Action::NextMapper; 2]
+        );
+        // So was a prefix, on either side: keypad 4 is no key, and neither is E0 M.
+        let mut keyboard = Keyboard::new();
+        assert_eq!(
+            actions(&mut keyboard, &[LEFT, LEFT | UP, EXTENDED, M, M]),
+            [Action::NextMapper]
+        );
+    }
+
+    /// Whatever comes: no panic, and a key works after it.
+    #[test]
+    fn noise_is_harmless() {
+        let seed = fastrand::u64(..);
+        std::println!("seed {seed}");
+        let mut random = fastrand::Rng::with_seed(seed);
+        for _ in 0..1000 {
+            let mut keyboard = Keyboard::new();
+            for _ in 0..random.usize(..200) {
+                keyboard.push(random.u8(..));
+            }
+            let pushed = actions(&mut keyboard, &[M | UP, M | UP, M]);
+            assert_eq!(pushed, [Action::NextMapper]);
+        }
+    }
+}

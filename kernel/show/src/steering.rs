@@ -1,0 +1,702 @@
+//! Steering: what the pictures of a running show depend on, and how it is changed.
+//!
+//! A picture is a function of [`State`] and a tick, and a state changes at ticks alone: what was
+//! changed, and when, is all that there is to know of a show. So the [`Log`] of it brings the same
+//! pictures again, on any machine and however many ticks that one skips.
+//!
+//! # Motion
+//!
+//! The scene moves by itself: its pose at a time is [`Entry::pose`]. Steering lets that time pass
+//! faster or slower, and adds a turn about each axis and a distance. Rates are integers a tick;
+//! a change takes all up that has come together since the last one and starts anew from its tick,
+//! so nothing is ever summed up tick by tick, and no error grows.
+//!
+//! Keys repeat. What a repeated key can do is bounded by the legal ranges, so holding one down for an
+//! hour does no more than for a minute.
+
+use link::{Action, Change, Setting, Word};
+use scene::Pose;
+use scene::catalogue::{CATALOGUE, Entry};
+use texmap::{Mapper, Order, Tolerance};
+
+/// One, with 16 fraction bits.
+const ONE: u32 = 1 << 16;
+/// What one push adds to a rate: 1/2880 turn a tick, a quarter of the ball's own turn.
+const PUSH: i32 = ((1u64 << 32) / 2880) as i32;
+/// Most pushes to one side: a turn in a second and a half.
+const MAX_PUSHES: i32 = 32;
+/// What one step changes the distance by, 16.16: 1/16 unit.
+const STEP: i32 = 1 << 12;
+/// Most gears up or down; four double the speed, so it is up to 16 times faster or slower.
+const MAX_GEAR: i8 = 16;
+
+/// How the pose comes about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Motion {
+    /// The tick of the last change. What follows is as it was then.
+    since: u32,
+    /// The scene's own time, in ticks with 16 fraction bits; 48 bits.
+    time: u64,
+    /// Whether it passes.
+    own: bool,
+    /// What yaw, pitch and roll are turned by, in fractions of a turn.
+    turned: [u32; 3],
+    /// Pushes that each of them turns by.
+    pushes: [i32; 3],
+    /// What the distance is more, 16.16.
+    distance: i32,
+    /// How fast all of it goes: 2^(gear / 4) times.
+    gear: i8,
+    /// Whether nothing moves, whatever the rates.
+    paused: bool,
+}
+
+impl Motion {
+    /// As the scene moves by itself.
+    const OWN: Self = Self {
+        since: 0,
+        time: 0,
+        own: true,
+        turned: [0; 3],
+        pushes: [0; 3],
+        distance: 0,
+        gear: 0,
+        paused: false,
+    };
+
+    /// How many times faster the gear makes it, 16.16.
+    fn factor(&self) -> u32 {
+        // 2^(0/4) to 2^(3/4), rounded to nearest.
+        const QUARTERS: [u32; 4] = [ONE, 77_936, 92_682, 110_218];
+        let factor = QUARTERS[self.gear.rem_euclid(4) as usize];
+        match self.gear.div_euclid(4) {
+            octaves @ 0.. => factor << octaves,
+            octaves => factor >> -octaves,
+        }
+    }
+
+    /// What each angle turns by in a tick, as a fraction of a turn.
+    fn rates(&self) -> [i32; 3] {
+        let factor = i64::from(self.factor());
+        // 32 pushes of 16 times are less than a quarter of a turn.
+        self.pushes
+            .map(|pushes| ((i64::from(pushes * PUSH) * factor) >> 16) as i32)
+    }
+
+    /// The same motion, told from `tick` on.
+    fn at(&self, tick: u32) -> Self {
+        self.after(if self.paused {
+            0
+        } else {
+            tick.wrapping_sub(self.since)
+        })
+        .starting(tick)
+    }
+
+    fn starting(self, since: u32) -> Self {
+        Self { since, ..self }
+    }
+
+    /// What it comes to after `ticks`, told from the same tick.
+    fn after(&self, ticks: u32) -> Self {
+        let mut after = *self;
+        if self.own {
+            let passed = u64::from(self.factor()) * u64::from(ticks);
+            after.time = self.time.wrapping_add(passed) & ((1 << 48) - 1);
+        }
+        for (turned, rate) in after.turned.iter_mut().zip(self.rates()) {
+            *turned = turned.wrapping_add((rate as u32).wrapping_mul(ticks));
+        }
+        after
+    }
+
+    /// The pose at the motion's own tick.
+    fn pose(&self, own: impl Fn(u32) -> Pose) -> Pose {
+        let tick = (self.time >> 16) as u32;
+        let part = i64::from(self.time as u32 % ONE);
+        let own = match part {
+            0 => own(tick),
+            // A slow scene would stand still for ticks, and then jump.
+            _ => between(&own(tick), &own(tick.wrapping_add(1)), part),
+        };
+        let [yaw, pitch, roll] = self.turned;
+        Pose {
+            yaw: own.yaw.wrapping_add(yaw),
+            pitch: own.pitch.wrapping_add(pitch),
+            roll: own.roll.wrapping_add(roll),
+            distance: (own.distance + self.distance).clamp(0, Pose::MAX_DISTANCE),
+        }
+    }
+
+    /// Turns the angle number `angle` by a push more to one side.
+    fn push(&mut self, angle: usize, side: i32) {
+        self.pushes[angle] = (self.pushes[angle] + side).clamp(-MAX_PUSHES, MAX_PUSHES);
+    }
+
+    fn moves(&self) -> bool {
+        self.own || self.pushes != [0; 3]
+    }
+
+    fn faster(&mut self) {
+        match self.moves() {
+            true => self.gear = (self.gear + 1).min(MAX_GEAR),
+            false => self.own = true,
+        }
+    }
+
+    fn slower(&mut self) {
+        if self.moves() {
+            self.gear = (self.gear - 1).max(-MAX_GEAR);
+        }
+    }
+
+    fn stop(&mut self) {
+        (self.own, self.pushes, self.gear) = (false, [0; 3], 0);
+    }
+
+    /// Moves by `step`, as far as the pose stays legal.
+    fn approach(&mut self, step: i32, own: impl Fn(u32) -> Pose) {
+        let here = self.pose(own).distance;
+        self.distance += (here + step).clamp(0, Pose::MAX_DISTANCE) - here;
+    }
+}
+
+/// The pose a part, 16 fraction bits, of the way from one to another, each angle the shorter way.
+fn between(from: &Pose, to: &Pose, part: i64) -> Pose {
+    let angle = |a: u32, b: u32| {
+        let way = i64::from(b.wrapping_sub(a) as i32);
+        a.wrapping_add(((way * part) >> 16) as u32)
+    };
+    let way = i64::from(to.distance) - i64::from(from.distance);
+    Pose {
+        yaw: angle(from.yaw, to.yaw),
+        pitch: angle(from.pitch, to.pitch),
+        roll: angle(from.roll, to.roll),
+        distance: from.distance + ((way * part) >> 16) as i32,
+    }
+}
+
+/// The scenes that there are: those of the catalogue, and the model that was loaded.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Scenes<'a> {
+    model: Option<Entry<'a>>,
+}
+
+impl<'a> Scenes<'a> {
+    /// With a model, or without.
+    pub fn new(model: Option<Entry<'a>>) -> Self {
+        Self { model }
+    }
+
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = Entry<'a>> + use<'a> {
+        CATALOGUE.iter().copied().chain(self.model)
+    }
+
+    /// The scene of a show that was not told another one: the model, or the ball.
+    pub fn default(&self) -> Entry<'a> {
+        self.model.unwrap_or(CATALOGUE[0])
+    }
+
+    /// The scene of a name.
+    fn named(&self, name: &str) -> Option<Entry<'a>> {
+        self.all().find(|entry| entry.name == name)
+    }
+
+    /// The scene after one, around the end.
+    fn after(&self, entry: &Entry<'a>) -> Entry<'a> {
+        let mut rest = self.all().skip_while(|known| known.name != entry.name);
+        rest.nth(1).unwrap_or(CATALOGUE[0])
+    }
+}
+
+/// What a picture depends on, its tick aside.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct State<'a> {
+    /// The scenes to choose from.
+    pub scenes: Scenes<'a>,
+    /// The scene.
+    pub entry: Entry<'a>,
+    /// How its textures are mapped.
+    pub mapper: Mapper,
+    /// In which order runs are drawn.
+    pub order: Order,
+    motion: Motion,
+}
+
+/// A name that nothing has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Unknown;
+
+impl<'a> State<'a> {
+    /// A scene as it moves by itself, with the default settings.
+    pub fn of(scenes: Scenes<'a>, entry: Entry<'a>) -> Self {
+        Self {
+            scenes,
+            entry,
+            mapper: Mapper::default(),
+            order: Order::default(),
+            motion: Motion::OWN,
+        }
+    }
+
+    /// The same settings, and the scene as it moves by itself.
+    pub fn unsteered(&self) -> Self {
+        Self {
+            motion: Motion::OWN,
+            ..*self
+        }
+    }
+
+    /// The pose at a tick, not before the last change.
+    pub fn pose(&self, tick: u32) -> Pose {
+        self.motion.at(tick).pose(|tick| self.entry.pose(tick))
+    }
+
+    /// Changes it at a tick, not before the last change. Whether that changes anything.
+    ///
+    /// # Errors
+    /// A name that nothing has: nothing is changed.
+    pub fn change(&mut self, tick: u32, change: &Change) -> Result<bool, Unknown> {
+        let mut next = *self;
+        match change {
+            Change::Act(action) => next.act(tick, *action),
+            Change::Set(setting, name) => next.set(*setting, name)?,
+        }
+        let changed = next.differs(self, tick);
+        if changed {
+            *self = next;
+        }
+        Ok(changed)
+    }
+
+    fn differs(&self, other: &Self, tick: u32) -> bool {
+        self.entry.name != other.entry.name
+            || (self.mapper, self.order) != (other.mapper, other.order)
+            || self.motion.at(tick) != other.motion.at(tick)
+    }
+
+    fn act(&mut self, tick: u32, action: Action) {
+        self.motion = self.motion.at(tick);
+        let (motion, entry) = (&mut self.motion, self.entry);
+        match action {
+            // With a positive angle what looks at the viewer goes to the left, down, and the top
+            // to the right.
+            Action::YawLeft => motion.push(0, 1),
+            Action::YawRight => motion.push(0, -1),
+            Action::PitchUp => motion.push(1, -1),
+            Action::PitchDown => motion.push(1, 1),
+            Action::RollLeft => motion.push(2, -1),
+            Action::RollRight => motion.push(2, 1),
+            Action::Faster => motion.faster(),
+            Action::Slower => motion.slower(),
+            Action::Stop => motion.stop(),
+            Action::Pause => motion.paused = !motion.paused,
+            Action::Step if motion.paused => *motion = motion.after(1),
+            Action::Step => motion.paused = true,
+            Action::Nearer => motion.approach(-STEP, |tick| entry.pose(tick)),
+            Action::Farther => motion.approach(STEP, |tick| entry.pose(tick)),
+            Action::NextScene => {
+                let next = self.scenes.after(&entry);
+                self.put(next);
+            }
+            Action::NextMapper => self.mapper = neighbour(self.mapper, 1),
+            Action::LastMapper => self.mapper = neighbour(self.mapper, Mapper::ALL.len() - 1),
+            Action::Finer => self.mapper = within(self.mapper, Tolerance::half),
+            Action::Coarser => self.mapper = within(self.mapper, Tolerance::double),
+            Action::NextOrder => {
+                let here = Order::ALL
+                    .iter()
+                    .position(|(_, order, _)| *order == self.order);
+                let next = here.map_or(0, |here| (here + 1) % Order::ALL.len());
+                self.order = Order::ALL[next].1;
+            }
+            Action::Reset => *self = Self::of(self.scenes, entry),
+        }
+    }
+
+    fn set(&mut self, setting: Setting, name: &Word) -> Result<(), Unknown> {
+        let name = name.as_str();
+        match setting {
+            Setting::Scene => self.put(self.scenes.named(name).ok_or(Unknown)?),
+            Setting::Mapper => self.mapper = Mapper::parse(name).ok_or(Unknown)?,
+            Setting::Order => self.order = Order::parse(name).ok_or(Unknown)?,
+        }
+        Ok(())
+    }
+
+    /// Puts a scene there; another one starts as it moves by itself.
+    fn put(&mut self, entry: Entry<'a>) {
+        if entry.name != self.entry.name {
+            self.entry = entry;
+            self.motion = Motion::OWN;
+        }
+    }
+}
+
+/// The mapper `steps` further on in the list, around its end. A tolerance that is not in the list
+/// stands where those begin.
+fn neighbour(mapper: Mapper, steps: usize) -> Mapper {
+    let listed = |(_, known, _): &(_, Mapper, _)| match (mapper.name(), mapper, *known) {
+        ("", Mapper::Within(_), Mapper::Within(_)) => true,
+        _ => *known == mapper,
+    };
+    let here = Mapper::ALL.iter().position(listed).unwrap_or(0);
+    Mapper::ALL[(here + steps) % Mapper::ALL.len()].1
+}
+
+/// `within-T` with another tolerance, as far as one is legal; from any other mapper `within-1`.
+fn within(mapper: Mapper, other: fn(Tolerance) -> Option<Tolerance>) -> Mapper {
+    match mapper {
+        Mapper::Within(tolerance) => Mapper::Within(other(tolerance).unwrap_or(tolerance)),
+        _ => Mapper::Within(Tolerance::TEXEL),
+    }
+}
+
+/// A change and its tick.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Noted {
+    tick: u32,
+    change: Change,
+}
+
+impl Noted {
+    /// All zeros, so that an empty log needs no room in the kernel's image.
+    const NONE: Self = Self {
+        tick: 0,
+        change: Change::Act(Action::YawLeft),
+    };
+}
+
+/// Room for a log's changes.
+pub(crate) type Notes = [Noted; Log::MAX];
+
+/// What was changed, and when, since a state that is known.
+#[derive(Debug)]
+pub(crate) struct Log<'a> {
+    /// What it started with.
+    start: State<'a>,
+    notes: &'a mut Notes,
+    len: usize,
+    /// Changes that were made and not noted.
+    lost: u32,
+}
+
+/// Why a change is not noted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NotNoted {
+    /// Its tick is before the last one's, which is this.
+    Before(u32),
+    /// There is no more room.
+    Full,
+}
+
+impl<'a> Log<'a> {
+    /// Most changes. What is pushed to its limit is noted no more, so that is some hundred a minute of
+    /// someone who never stops playing.
+    pub const MAX: usize = 1024;
+
+    /// Room, all zeros.
+    pub const NOTES: Notes = [Noted::NONE; Self::MAX];
+
+    /// Nothing changed since `start`.
+    pub fn new(start: State<'a>, notes: &'a mut Notes) -> Self {
+        let (len, lost) = (0, 0);
+        Self {
+            start,
+            notes,
+            len,
+            lost,
+        }
+    }
+
+    /// Starts anew.
+    pub fn restart(&mut self, start: State<'a>) {
+        (self.start, self.len, self.lost) = (start, 0, 0);
+    }
+
+    /// What it started with.
+    pub fn start(&mut self) -> &mut State<'a> {
+        &mut self.start
+    }
+
+    /// The changes with their ticks, which never go back.
+    pub fn changes(&self) -> impl Iterator<Item = (u32, &Change)> {
+        self.notes[..self.len]
+            .iter()
+            .map(|noted| (noted.tick, &noted.change))
+    }
+
+    /// How many changes were made and not noted.
+    pub fn lost(&self) -> u32 {
+        self.lost
+    }
+
+    /// Notes a change.
+    ///
+    /// # Errors
+    /// A tick before the last one's, and a log that is full.
+    pub fn note(&mut self, tick: u32, change: Change) -> Result<(), NotNoted> {
+        let last = self.changes().last().map(|(tick, _)| tick);
+        if let Some(last) = last.filter(|&last| tick < last) {
+            return Err(NotNoted::Before(last));
+        }
+        let place = self.notes.get_mut(self.len).ok_or(NotNoted::Full)?;
+        *place = Noted { tick, change };
+        self.len += 1;
+        Ok(())
+    }
+
+    /// Notes a change that was made. If that can't be it is counted: ticks go around after 828 days.
+    pub fn keep(&mut self, tick: u32, change: Change) {
+        if self.note(tick, change).is_err() {
+            self.lost = self.lost.saturating_add(1);
+        }
+    }
+
+    /// What the state was at a tick. Nothing if changes are missing that came before it.
+    pub fn state(&self, tick: u32) -> Option<State<'a>> {
+        let mut state = self.start;
+        for (noted, change) in self.changes() {
+            if tick < noted {
+                return Some(state);
+            }
+            // A name that nothing has was never noted.
+            let _ = state.change(noted, change);
+        }
+        (self.lost == 0).then_some(state)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    fn random() -> fastrand::Rng {
+        let seed = fastrand::u64(..);
+        std::println!("seed {seed}");
+        fastrand::Rng::with_seed(seed)
+    }
+
+    /// A catalogue's scene, as it moves by itself.
+    fn own(number: usize) -> State<'static> {
+        State::of(Scenes::new(None), CATALOGUE[number])
+    }
+
+    fn act(state: &mut State<'_>, tick: u32, action: Action) -> bool {
+        state.change(tick, &Change::Act(action)).unwrap()
+    }
+
+    fn any(random: &mut fastrand::Rng) -> Action {
+        Action::ALL[random.usize(..Action::ALL.len())].1
+    }
+
+    #[test]
+    fn a_show_that_is_not_steered_is_the_scenes_own() {
+        for (number, entry) in CATALOGUE.iter().enumerate() {
+            let state = own(number);
+            for tick in [0, 1, 720, u32::MAX] {
+                assert_eq!(state.pose(tick), entry.pose(tick));
+            }
+        }
+    }
+
+    /// Taking up what has come together, at any tick, changes no pose after it.
+    #[test]
+    fn a_pose_does_not_depend_on_when_it_was_looked_at() {
+        let mut random = random();
+        for _ in 0..200 {
+            let mut state = own(random.usize(..CATALOGUE.len()));
+            let mut tick = random.u32(..);
+            for _ in 0..random.usize(..30) {
+                act(&mut state, tick, any(&mut random));
+                tick = tick.wrapping_add(random.u32(..100));
+            }
+            let mut looked = state;
+            let end = tick.wrapping_add(1000);
+            while tick != end {
+                looked.motion = looked.motion.at(tick);
+                tick = tick.wrapping_add(1);
+            }
+            assert_eq!(looked.pose(end), state.pose(end));
+        }
+    }
+
+    #[test]
+    fn keys_held_down_stay_in_the_legal_ranges_and_come_to_nothing_more() {
+        for (_, action) in Action::ALL {
+            let mut state = own(0);
+            let toggles = matches!(
+                action,
+                Action::Pause
+                    | Action::Step
+                    | Action::NextScene
+                    | Action::NextMapper
+                    | Action::LastMapper
+                    | Action::NextOrder
+            );
+            for tick in 0..3000 {
+                let changed = act(&mut state, tick, action);
+                assert!(!changed || tick < 2999 || toggles, "{action} goes on");
+                let pose = state.pose(tick);
+                assert!((0..=Pose::MAX_DISTANCE).contains(&pose.distance));
+            }
+        }
+        let mut random = random();
+        let mut state = own(0);
+        for tick in 0..20_000 {
+            act(&mut state, tick, any(&mut random));
+            let pose = state.pose(tick + random.u32(..1000));
+            assert!((0..=Pose::MAX_DISTANCE).contains(&pose.distance));
+        }
+    }
+
+    /// Where the nearest point of the ball goes, and its top.
+    #[test]
+    fn each_turn_goes_the_way_of_its_name() {
+        const UNIT: i32 = 1 << 16;
+        for (action, point, [x, y]) in [
+            (Action::YawLeft, [0, 0, -UNIT], [-1, 0]),
+            (Action::YawRight, [0, 0, -UNIT], [1, 0]),
+            (Action::PitchUp, [0, 0, -UNIT], [0, -1]),
+            (Action::PitchDown, [0, 0, -UNIT], [0, 1]),
+            (Action::RollLeft, [0, -UNIT, 0], [-1, 0]),
+            (Action::RollRight, [0, -UNIT, 0], [1, 0]),
+        ] {
+            let mut motion = Motion::OWN;
+            motion.stop();
+            let mut state = own(0);
+            state.motion = motion;
+            act(&mut state, 0, action);
+            let level = Pose {
+                yaw: 0,
+                pitch: 0,
+                roll: 0,
+                distance: 4 * UNIT,
+            };
+            let turned = state.motion.at(10).pose(|_| level);
+            let [to_x, to_y, _] = turned.orientation().turn(point);
+            let near = |to: i32, from: i32| {
+                if (to - from).abs() < 300 {
+                    0
+                } else {
+                    (to - from).signum()
+                }
+            };
+            assert_eq!(
+                [near(to_x, point[0]), near(to_y, point[1])],
+                [x, y],
+                "{action}"
+            );
+        }
+    }
+
+    #[test]
+    fn faster_and_slower_are_each_others_opposite_and_stop_is_still() {
+        let mut state = own(0);
+        let speed =
+            |state: &State<'_>| state.pose(800).yaw.wrapping_sub(state.pose(720).yaw) as i32;
+        let normal = speed(&state);
+        for _ in 0..4 {
+            act(&mut state, 0, Action::Faster);
+        }
+        assert_eq!(speed(&state), 2 * normal);
+        for _ in 0..8 {
+            act(&mut state, 0, Action::Slower);
+        }
+        // An odd number of ticks at half the speed: between two of the scene's own.
+        let slow = state.pose(801).yaw.wrapping_sub(state.pose(800).yaw) as i32;
+        assert!((slow - normal / 80 / 2).abs() < 4, "{slow}");
+        act(&mut state, 900, Action::Stop);
+        assert_eq!(state.pose(900), state.pose(5000));
+        assert!(!act(&mut state, 5000, Action::Slower));
+        act(&mut state, 5000, Action::Faster);
+        assert_eq!(
+            speed(&State {
+                motion: state.motion.starting(0),
+                ..state
+            }),
+            normal
+        );
+    }
+
+    #[test]
+    fn a_pause_stands_and_steps_by_ticks() {
+        let mut state = own(0);
+        let running = state;
+        act(&mut state, 100, Action::Pause);
+        assert_eq!(state.pose(200), running.pose(100));
+        act(&mut state, 200, Action::Step);
+        act(&mut state, 300, Action::Step);
+        assert_eq!(state.pose(400), running.pose(102));
+        act(&mut state, 500, Action::Pause);
+        assert_eq!(state.pose(501), running.pose(103));
+    }
+
+    #[test]
+    fn settings_go_around_and_tolerances_to_their_ends() {
+        let mut state = own(0);
+        let (mapper, order, scene) = (state.mapper, state.order, state.entry.name);
+        for _ in 0..Mapper::ALL.len() {
+            act(&mut state, 0, Action::NextMapper);
+        }
+        for _ in 0..Order::ALL.len() {
+            act(&mut state, 0, Action::NextOrder);
+        }
+        for _ in 0..CATALOGUE.len() {
+            act(&mut state, 0, Action::NextScene);
+        }
+        assert_eq!(
+            (state.mapper, state.order, state.entry.name),
+            (mapper, order, scene)
+        );
+        act(&mut state, 0, Action::NextMapper);
+        act(&mut state, 0, Action::LastMapper);
+        assert_eq!(state.mapper, mapper);
+        let mut names = Vec::new();
+        for action in [Action::Finer, Action::Coarser] {
+            for _ in 0..40 {
+                act(&mut state, 0, action);
+            }
+            names.push(std::format!("{}", state.mapper));
+        }
+        assert_eq!(names, ["within-1/65536", "within-256"]);
+        // It is not in the list, and has its neighbours all the same.
+        act(&mut state, 0, Action::NextMapper);
+        assert_eq!(state.mapper.name(), "within-1/2");
+    }
+
+    #[test]
+    fn a_log_knows_the_state_at_every_tick_until_it_is_full() {
+        let mut random = random();
+        let mut notes = Box::new(Log::NOTES);
+        let start = own(0);
+        let mut log = Log::new(start, &mut notes);
+        let (mut state, mut tick, mut poses) = (start, 0, Vec::new());
+        while log.changes().count() < Log::MAX {
+            let action = any(&mut random);
+            if action != Action::NextScene && act(&mut state, tick, action) {
+                log.keep(tick, Change::Act(action));
+            }
+            if random.bool() {
+                poses.push((tick, state.pose(tick)));
+                tick += random.u32(1..5);
+            }
+        }
+        for (tick, pose) in &poses {
+            assert_eq!(log.state(*tick).unwrap().pose(*tick), *pose, "at {tick}");
+        }
+        assert!(log.state(tick).is_some());
+        let stop = Change::Act(Action::Stop);
+        assert!(matches!(log.note(0, stop), Err(NotNoted::Before(last)) if last <= tick));
+        assert_eq!(log.note(tick, stop), Err(NotNoted::Full));
+        log.keep(tick, stop);
+        assert_eq!(log.lost(), 1);
+        assert!(log.state(tick).is_none() && log.state(0).is_some());
+        log.restart(start);
+        assert_eq!((log.lost(), log.changes().count()), (0, 0));
+    }
+}

@@ -1,0 +1,213 @@
+//! A running show on the emulated card, steered by keys and commands, and drawn again from its log.
+
+use emulator::Vga;
+use link::{Action, write_line};
+use show::{KEYS, Memory, Show};
+
+/// The lines of a command's answer.
+fn ask(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
+    let mut bytes = Vec::new();
+    write_line(format_args!("{line}"), |sent| bytes.extend_from_slice(sent));
+    let mut answer = Vec::new();
+    for byte in bytes {
+        show.receive(byte, tick, &mut |line| answer.push(line.to_string()));
+    }
+    assert_eq!(show.bus().take_faults(), [], "{line}");
+    answer
+}
+
+/// The answer of a command that is carried out, without its end.
+fn done(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
+    let mut answer = ask(show, line, tick);
+    assert_eq!(answer.pop().unwrap(), format!("ok {line}"), "{answer:?}");
+    answer
+}
+
+/// What is shown: the bytes' checksums, and what they are the picture of.
+fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {
+    let mut evidence = done(show, "checksums", tick);
+    // The same picture may be on another page.
+    let (_, crc) = evidence[0].split_once(" crc ").unwrap();
+    evidence[0] = crc.to_string();
+    let state = done(show, "state", tick);
+    let named =
+        |line: &&String| ["scene", "mapper", "picture"].contains(&line.split(' ').next().unwrap());
+    evidence.extend(state.iter().filter(named).cloned());
+    evidence
+}
+
+/// Codes of some keys: the keyboard's own table knows the others.
+const M: u8 = 0x32;
+const LEFT: [u8; 2] = [0xE0, 0x4B];
+const PAGE_UP: [u8; 2] = [0xE0, 0x49];
+const RELEASED: u8 = 0x80;
+
+#[test]
+fn a_log_brings_back_every_picture_byte_for_byte() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    let mut random = fastrand::Rng::with_seed(seed);
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let (mut tick, mut seen) = (random.u32(..1000), Vec::new());
+    for picture in 0..60 {
+        show.present(tick, &mut |_| {});
+        seen.push((tick, evidence(&mut show, tick)));
+        // Some come after the picture of their tick, some before that of theirs.
+        for _ in 0..random.usize(..4) {
+            let (_, action) = Action::ALL[random.usize(..Action::ALL.len())];
+            match random.u8(..8) {
+                // What was before is not in the log then.
+                _ if action == Action::Reset => {}
+                0 => LEFT
+                    .iter()
+                    .chain(&PAGE_UP)
+                    .for_each(|&code| show.key(code, tick)),
+                1 => [M, M, M | RELEASED]
+                    .iter()
+                    .for_each(|&code| show.key(code, tick)),
+                2 => _ = done(&mut show, "mapper within-3/8", tick),
+                3 if picture % 4 == 0 => _ = done(&mut show, "steer scene cube", tick),
+                _ => _ = done(&mut show, &format!("steer {action}"), tick),
+            }
+            tick += random.u32(..3);
+        }
+        tick += 1;
+    }
+    let log = done(&mut show, "log", tick);
+    println!("{log:#?}");
+    let mut memory = Box::new(Memory::new());
+    let mut twin = Show::new(&mut memory, Vga::new(), None);
+    for (show, start) in [(&mut twin, "hold"), (&mut show, "hold")] {
+        done(show, start, 0);
+        for line in &log {
+            done(show, line, 0);
+        }
+        assert_eq!(done(show, "log", 0), log);
+        // In any order.
+        for _ in 0..30 {
+            let (tick, shown) = &seen[random.usize(..seen.len())];
+            done(show, &format!("show at {tick}"), 0);
+            assert_eq!(&evidence(show, 0), shown, "at {tick}");
+        }
+    }
+    // A picture's name is enough to draw it.
+    let (tick, shown) = &seen[50];
+    done(&mut show, &format!("show at {tick}"), 0);
+    let picture = shown
+        .iter()
+        .find_map(|line| line.strip_prefix("picture "))
+        .unwrap();
+    for line in &shown[2..4] {
+        done(&mut twin, line, 0);
+    }
+    done(&mut twin, &format!("show {picture}"), 0);
+    assert_eq!(evidence(&mut twin, 0), evidence(&mut show, 0));
+}
+
+#[test]
+fn a_running_show_can_be_stopped_at_a_tick_of_its_own() {
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    show.present(10, &mut |_| {});
+    done(&mut show, "steer nearer", 10);
+    show.present(12, &mut |_| {});
+    let shown = evidence(&mut show, 12);
+    done(&mut show, "steer next-mapper", 12);
+    show.present(13, &mut |_| {});
+    done(&mut show, "show at 12", 13);
+    assert_eq!(evidence(&mut show, 13), shown);
+    assert_eq!(
+        done(&mut show, "log", 13)[3..],
+        ["steer 11 nearer", "steer 13 next-mapper"]
+    );
+    // What runs again runs by itself, as it was last drawn.
+    done(&mut show, "run", 20);
+    show.present(20, &mut |_| {});
+    assert_eq!(
+        done(&mut show, "state", 20)[1..5],
+        [
+            "scene ball",
+            "mapper shifts",
+            "order polygons",
+            "picture 20",
+        ]
+    );
+    assert_eq!(done(&mut show, "log", 20).len(), 3);
+}
+
+#[test]
+fn what_cannot_be_steered_is_told() {
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let refused = |show: &mut Show<'_, Vga>, line, reason| {
+        let answer = ask(show, line, 3);
+        assert!(
+            answer.len() == 1 && answer[0].starts_with("error ") && answer[0].contains(reason),
+            "{line}: {answer:?}"
+        );
+    };
+    show.present(3, &mut |_| {});
+    refused(&mut show, "steer 3 stop", "without a tick");
+    refused(&mut show, "steer mapper none", "no mapper 'none'");
+    refused(&mut show, "mapper none", "no mapper 'none'");
+    done(&mut show, "hold", 3);
+    refused(&mut show, "steer stop", "a tick has to be said");
+    refused(&mut show, "steer 5 scene none", "no scene 'none'");
+    done(&mut show, "steer 5 stop", 3);
+    refused(&mut show, "steer 4 stop", "the last one is 5");
+    // A held show has no use for keys.
+    show.key(M, 3);
+    assert_eq!(done(&mut show, "log", 3)[3..], ["steer 5 stop"]);
+    for tick in 6..6 + 1023 {
+        done(&mut show, &format!("steer {tick} yaw-left"), 3);
+    }
+    refused(&mut show, "steer 9999 stop", "it holds 1024 changes");
+}
+
+/// Actions act on when the log is full; a reset begins it anew.
+#[test]
+fn a_full_log_is_told_and_steers_on() {
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    for tick in 0..1027 {
+        done(&mut show, "steer next-order", tick);
+    }
+    let log = done(&mut show, "log", 1027);
+    assert_eq!(
+        (log.len(), log.last().unwrap().as_str()),
+        (3 + 1024 + 1, "lost 3")
+    );
+    let order = &done(&mut show, "state", 1027)[3];
+    assert_eq!(
+        order, "order planes",
+        "1027 is one more than a multiple of three"
+    );
+    let answer = ask(&mut show, "show at 1027", 1027);
+    assert_eq!(
+        answer,
+        ["error the log is full, and changes before tick 1027 are not in it"]
+    );
+    done(&mut show, "steer reset", 1028);
+    let log = done(&mut show, "log", 1028);
+    assert_eq!(log, ["scene ball", "mapper shifts", "order polygons"]);
+    done(&mut show, "show at 1028", 1028);
+}
+
+#[test]
+fn keys_are_listed_with_what_they_do() {
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let keys = done(&mut show, "keys", 0);
+    assert_eq!(keys.len(), KEYS.len());
+    assert!(
+        keys.contains(&"Space pause: pause, and go on".to_string()),
+        "{keys:?}"
+    );
+    show.key(M, 0);
+    show.set_lost_keys(2);
+    assert_eq!(
+        done(&mut show, "counts", 0).last().unwrap(),
+        "keys taken 1 lost 2"
+    );
+}
