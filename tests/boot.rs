@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use crystal_ball::card::{Card, Emulated};
 use crystal_ball::machine::{Machine, Verdict};
 use judged::{Judged, verdict};
-use link::{Command, Fault, Picture};
+use link::{Action, Change, Command, Content, Fault, Picture};
 use modex::registers::MODE_X;
 use ready::{READY, config};
 use show::Memory;
@@ -92,6 +92,78 @@ fn the_running_show_paces_itself_and_can_be_held() {
     );
     machine.ask(Command::Run).unwrap();
     machine.wait_until_running().unwrap();
+    machine.leave().unwrap();
+}
+
+/// By keys at the keyboard and by commands; what is shown then is drawn again from the log, held, and
+/// on the emulated card.
+#[test]
+fn a_steered_show_is_brought_back_by_its_log() {
+    let mut machine = boot();
+    machine.wait_until_running().unwrap();
+    // Held down, as QEMU's window sends repeats; more codes than the machine has room for.
+    for _ in 0..100 {
+        machine.key("left", true).unwrap();
+        machine.key("m", true).unwrap();
+    }
+    for key in ["left", "m", "d", "kp_add", "pgup"] {
+        machine.key(key, true).unwrap();
+        machine.key(key, false).unwrap();
+    }
+    let steer = |name| Command::Steer(None, Change::Act(Action::parse(name).unwrap()));
+    for name in ["next-scene", "pitch-up", "coarser"] {
+        machine.ask(steer(name)).unwrap();
+        machine.rest(Duration::from_millis(100)).unwrap();
+    }
+    machine.key("spc", true).unwrap();
+    let mut log = Vec::new();
+    while !log.iter().any(|line: &String| line.ends_with(" pause")) {
+        log = machine.ask(Command::Log).unwrap();
+    }
+    println!("{log:#?}");
+    let pushed = |name| log.iter().filter(|line| line.ends_with(name)).count();
+    assert_eq!((pushed(" next-mapper"), pushed(" next-scene")), (1, 1));
+    // As many as the scene takes; the scene after it begins anew.
+    assert!((20..=32).contains(&pushed(" yaw-left")), "{log:?}");
+    let paused = log
+        .last()
+        .unwrap()
+        .split(' ')
+        .nth(1)
+        .unwrap()
+        .parse()
+        .unwrap();
+    // The picture of that tick is on the screen.
+    machine.rest(Duration::from_millis(100)).unwrap();
+    let shown = machine.dump(Content::Page).unwrap();
+    let screen = machine.screen().unwrap();
+    assert!(
+        shown
+            .header
+            .picture
+            .unwrap()
+            .to_string()
+            .starts_with("pose ")
+    );
+
+    let mut memory = Box::new(Memory::new());
+    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let cards: [&mut dyn Card; 2] = [&mut machine, &mut emulated];
+    for card in cards {
+        card.ask(Command::Hold).unwrap();
+        for line in &log {
+            card.ask(Command::parse(line).unwrap()).unwrap();
+        }
+        card.ask(Command::ShowAt(paused)).unwrap();
+        let again = card.dump(Content::Page).unwrap();
+        assert_eq!(
+            (again.header.scene, again.header.mapper),
+            (shown.header.scene.clone(), shown.header.mapper)
+        );
+        assert_eq!(again.header.picture, shown.header.picture);
+        assert!(again.pixels == shown.pixels && again.palette == shown.palette);
+        assert!(card.screen().unwrap() == screen);
+    }
     machine.leave().unwrap();
 }
 

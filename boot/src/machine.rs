@@ -314,6 +314,20 @@ impl Machine {
         }
     }
 
+    /// Pushes a key down or lets it go, by QEMU's name for it: `left`, `m`, `kp_add`.
+    ///
+    /// # Errors
+    /// A [`Failure`], or what QEMU says.
+    pub fn key(&mut self, name: &str, down: bool) -> anyhow::Result<()> {
+        let key = json!({ "down": down, "key": { "type": "qcode", "data": name } });
+        let events = json!({ "events": [{ "type": "key", "data": key }] });
+        let answer = self.control("input-send-event", events)?;
+        match answer.get("error") {
+            Some(error) => Err(anyhow!("QEMU does not send the key '{name}': {error}")),
+            None => Ok(()),
+        }
+    }
+
     /// Asks the kernel to leave, and waits until QEMU has ended by it.
     ///
     /// # Errors

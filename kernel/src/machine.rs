@@ -2,6 +2,7 @@
 
 pub mod clock;
 mod cpu;
+pub mod keyboard;
 mod ports;
 pub mod report;
 pub mod serial;
@@ -27,7 +28,7 @@ pub const BOOT: BootloaderConfig = {
     config
 };
 
-/// The machine, ready: exceptions are reported, ticks count, the serial line works.
+/// The machine, ready: exceptions are reported, ticks count, serial line and keyboard work.
 #[derive(Debug)]
 pub struct Machine {
     /// The VGA.
@@ -46,6 +47,7 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
         show::VERSION
     ));
     cpu::init(boot_info.kernel_stack_bottom);
+    keyboard::init();
     timer::start();
     let offset = boot_info
         .physical_memory_offset
@@ -63,7 +65,7 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     Machine { vga, ramdisk }
 }
 
-/// Sleeps until an interrupt: a tick, or a byte on the serial line. `idle` is asked with
+/// Sleeps until an interrupt: a tick, a byte on the serial line, or a key. `idle` is asked with
 /// interrupts off, so nothing that arrives in between is slept through.
 pub fn sleep_while(idle: impl FnOnce() -> bool) {
     x86_64::instructions::interrupts::disable();

@@ -11,7 +11,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use bootloader_api::{BootInfo, BootloaderConfig};
-use crystal_ball_kernel::machine::{self, serial, timer};
+use crystal_ball_kernel::machine::{self, keyboard, serial, timer};
 use link::{LOADED, REFUSED};
 use pack::Pack;
 use show::{Memory, Request, Show};
@@ -37,11 +37,17 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
                 None => {}
             }
         }
+        while let Some(code) = keyboard::receive() {
+            show.key(code, timer::ticks());
+        }
+        show.set_lost_keys(keyboard::lost());
         let tick = timer::ticks();
         if show.is_due(tick) {
             show.present(tick, out);
         } else {
-            machine::sleep_while(|| timer::ticks() == tick && !serial::has_received());
+            machine::sleep_while(|| {
+                timer::ticks() == tick && !serial::has_received() && !keyboard::has_received()
+            });
         }
     }
 }

@@ -19,16 +19,17 @@ use x86_64::structures::gdt::{Descriptor, GlobalDescriptorTable, SegmentSelector
 use x86_64::structures::idt::InterruptDescriptorTable;
 use x86_64::structures::tss::TaskStateSegment;
 
-use super::{report, timer};
+use super::{keyboard, report, timer};
 
 /// Vector of IRQ 0; the ones below are the CPU's exceptions.
 const IRQ_BASE: u8 = 32;
 const IRQ_TIMER: u8 = IRQ_BASE;
+const IRQ_KEYBOARD: u8 = IRQ_BASE + 1;
 const IRQ_SERIAL: u8 = IRQ_BASE + 4;
 /// IRQ 7 arrives unasked when a request goes away before it is taken.
 const IRQ_SPURIOUS: u8 = IRQ_BASE + 7;
-/// Interrupt lines that stay masked: all but the timer's and COM1's.
-const MASK: [u8; 2] = [!0b0001_0001, 0xFF];
+/// Interrupt lines that stay masked: all but the timer's, the keyboard's and COM1's.
+const MASK: [u8; 2] = [!0b0001_0011, 0xFF];
 
 const PAGE_FAULT: u64 = 14;
 const PAGE_FAULT_STACK: u16 = 0;
@@ -86,7 +87,7 @@ static GDT: LazyLock<Segments> = LazyLock::new(|| {
 
 static IDT: LazyLock<InterruptDescriptorTable> = LazyLock::new(interrupt_table);
 
-/// Loads the tables and lets the timer's and COM1's interrupts through.
+/// Loads the tables and lets the interrupts of timer, keyboard and COM1 through.
 pub fn init(stack_bottom: u64) {
     STACK_BOTTOM.store(stack_bottom, Ordering::Relaxed);
     GDT.table.load();
@@ -242,6 +243,10 @@ extern "C" fn dispatch(frame: &Frame) {
             timer::tick();
             end_of_interrupt(IRQ_TIMER);
         }
+        IRQ_KEYBOARD => {
+            keyboard::take();
+            end_of_interrupt(IRQ_KEYBOARD);
+        }
         // The byte stays in the FIFO; waking the processor was all.
         IRQ_SERIAL => end_of_interrupt(IRQ_SERIAL),
         IRQ_SPURIOUS => {}
@@ -319,6 +324,7 @@ fn interrupt_table() -> InterruptDescriptorTable {
         idt.virtualization => 20, 0;
         idt.cp_protection_exception => 21, 1;
         idt[IRQ_TIMER] => IRQ_TIMER, 0;
+        idt[IRQ_KEYBOARD] => IRQ_KEYBOARD, 0;
         idt[IRQ_SERIAL] => IRQ_SERIAL, 0;
         idt[IRQ_SPURIOUS] => IRQ_SPURIOUS, 0;
     }
