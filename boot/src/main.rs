@@ -18,6 +18,7 @@ use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::model::{Files, Model};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child, record, replay, trade};
+use link::{Action, Change, Command};
 use show::Memory;
 
 /// How long the ball turns before its picture is taken without a display.
@@ -362,7 +363,8 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
         "the first picture is on the screen after {seconds:.1} s"
     ));
     if window.is_some() {
-        say("close the window or type Ctrl-C to end it");
+        machine.ask(Command::Steer(None, Change::Act(Action::Hint)))?;
+        say("H in the window tells the keys; close it or type Ctrl-C to end it");
         return machine.watch();
     }
     machine.rest(WARM_UP)?;

@@ -11,7 +11,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use bootloader_api::{BootInfo, BootloaderConfig};
-use crystal_ball_kernel::machine::{self, keyboard, serial, timer};
+use crystal_ball_kernel::machine::{self, clock, keyboard, serial, timer};
 use link::{LOADED, REFUSED};
 use pack::Pack;
 use show::{Memory, Request, Show};
@@ -29,6 +29,7 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     let pack = machine.ramdisk.and_then(taken);
     let mut show = Show::new(&mut memory, machine.vga, pack.as_ref());
     let out: &mut show::Out<'_> = &mut |line| serial::line(line);
+    let stopwatch = clock::Stopwatch::start(timer::ticks());
     loop {
         while let Some(byte) = serial::receive() {
             match show.receive(byte, timer::ticks(), out) {
@@ -43,7 +44,9 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
         show.set_lost_keys(keyboard::lost());
         let tick = timer::ticks();
         if show.is_due(tick) {
+            let before = clock::now();
             show.present(tick, out);
+            show.took(stopwatch.micros(before, timer::ticks()));
         } else {
             machine::sleep_while(|| {
                 timer::ticks() == tick && !serial::has_received() && !keyboard::has_received()

@@ -46,13 +46,19 @@ pub enum Action {
     Coarser,
     /// `next-order`
     NextOrder,
+    /// `help`: the keys, written over the picture, or no more.
+    Help,
+    /// `info`: figures of the pictures, written over them, or no more.
+    Info,
+    /// `hint`: for five seconds, which key is help.
+    Hint,
     /// `reset`: move as the scene does, with the default settings. The scene stays.
     Reset,
 }
 
 impl Action {
     /// Every action with its name on the line.
-    pub const ALL: [(&'static str, Self); 20] = [
+    pub const ALL: [(&'static str, Self); 23] = [
         ("yaw-left", Self::YawLeft),
         ("yaw-right", Self::YawRight),
         ("pitch-up", Self::PitchUp),
@@ -72,8 +78,17 @@ impl Action {
         ("finer", Self::Finer),
         ("coarser", Self::Coarser),
         ("next-order", Self::NextOrder),
+        ("help", Self::Help),
+        ("info", Self::Info),
+        ("hint", Self::Hint),
         ("reset", Self::Reset),
     ];
+
+    /// Whether it changes nothing but what is written over the picture. A log has none of these, and
+    /// a held show no use for them.
+    pub const fn is_overlay(self) -> bool {
+        matches!(self, Self::Help | Self::Info | Self::Hint)
+    }
 
     /// The action of a name.
     pub fn parse(name: &str) -> Option<Self> {

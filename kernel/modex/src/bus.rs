@@ -11,6 +11,8 @@ pub enum Purpose {
     Draw,
     /// Restoring the background of a page.
     Erase,
+    /// Writing over the picture.
+    Overlay,
     /// Changing the start address and waiting for it.
     Flip,
 }

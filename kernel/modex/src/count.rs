@@ -27,6 +27,8 @@ pub struct Counts {
     pub draw: Tally,
     /// [`Purpose::Erase`].
     pub erase: Tally,
+    /// [`Purpose::Overlay`].
+    pub overlay: Tally,
     /// [`Purpose::Flip`].
     pub flip: Tally,
 }
@@ -38,16 +40,18 @@ impl Counts {
             Purpose::Setup => &mut self.setup,
             Purpose::Draw => &mut self.draw,
             Purpose::Erase => &mut self.erase,
+            Purpose::Overlay => &mut self.overlay,
             Purpose::Flip => &mut self.flip,
         }
     }
 
     /// Each purpose's name and tally, in a fixed order.
-    pub fn named(&self) -> [(&'static str, Tally); 4] {
+    pub fn named(&self) -> [(&'static str, Tally); 5] {
         [
             ("setup", self.setup),
             ("draw", self.draw),
             ("erase", self.erase),
+            ("overlay", self.overlay),
             ("flip", self.flip),
         ]
     }

@@ -320,6 +320,14 @@ pub struct Canvas<'a, B> {
     page_start: usize,
 }
 
+impl<B: Bus> Canvas<'_, B> {
+    /// Has what follows counted for the overlay: the picture is drawn.
+    pub fn overlay(&mut self) -> &mut Self {
+        self.bus.purpose(Purpose::Overlay);
+        self
+    }
+}
+
 impl<B: Bus> Destination for Canvas<'_, B> {
     fn select(&mut self, x: u16) {
         write(self.bus, SEQUENCER, MAP_MASK, 1 << (x & 3));

@@ -240,6 +240,8 @@ fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
         for &(x, y, len, colour) in &columns {
             expected.column(x, y, len, |column| column.fill(|| colour));
         }
+        // Some have an overlay.
+        let (drawn, over) = columns.split_at(random.usize(0..=columns.len()));
         // Straight to the card, or in RAM first: a page may be either's in turn.
         let presented = random.bool();
         if presented {
@@ -250,13 +252,22 @@ fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
             card.present(&offscreen);
         } else {
             let mut canvas = card.begin(&background);
-            for &(x, y, len, colour) in &columns {
+            for &(x, y, len, colour) in drawn {
+                canvas.column(x, y, len, |column| column.fill(|| colour));
+            }
+            for &(x, y, len, colour) in over {
+                let canvas = canvas.overlay();
                 canvas.column(x, y, len, |column| column.fill(|| colour));
             }
         }
         card.flip();
         let counts = *card.bus().counts();
-        let selected = if presented { 4 } else { columns.len() as u64 };
+        let selected = if presented { 4 } else { drawn.len() as u64 };
+        let over = if presented { 0 } else { over.len() as u64 };
+        assert_eq!(
+            (counts.overlay.map_mask, counts.overlay.ports),
+            (over, over)
+        );
         assert_eq!(counts.draw.map_mask, selected);
         assert_eq!(counts.draw.ports, selected);
         let erased = u64::from(!presented);
@@ -449,13 +460,16 @@ fn every_write_is_counted_once_for_its_purpose() {
     let mut card = ModeX::set(&mut counted, &BLACK).unwrap();
     let mut canvas = card.begin(&[0; HEIGHT]);
     canvas.column(7, 30, 100, |column| column.fill(|| 1));
+    canvas
+        .overlay()
+        .column(6, 30, 10, |column| column.fill(|| 2));
     card.flip();
     let named = counted.counts().named();
     assert_eq!(
         named.map(|(name, _)| name),
-        ["setup", "draw", "erase", "flip"]
+        ["setup", "draw", "erase", "overlay", "flip"]
     );
-    let [setup, draw, erase, flip] = named.map(|(_, tally)| tally);
+    let [setup, draw, erase, overlay, flip] = named.map(|(_, tally)| tally);
     let tallies = |ports, map_mask, stores, bytes| Tally {
         ports,
         map_mask,
@@ -467,6 +481,7 @@ fn every_write_is_counted_once_for_its_purpose() {
     // The first time the whole page, and 8 bytes a store.
     let page = PAGE_BYTES as u64;
     assert_eq!(erase, tallies(1, 1, page / 8, page));
+    assert_eq!(overlay, tallies(1, 1, 10, 10));
     assert_eq!(flip, tallies(1, 0, 0, 0));
     // The rest is the mode set's: Map Mask once, and all of the planes.
     let planes = PLANE_BYTES as u64;
@@ -476,6 +491,6 @@ fn every_write_is_counted_once_for_its_purpose() {
         .filter(|a| matches!(a, Access::Out8(..) | Access::Out16(..)));
     assert_eq!(
         setup,
-        tallies(ports.count() as u64 - 3, 1, planes / 8, planes)
+        tallies(ports.count() as u64 - 4, 1, planes / 8, planes)
     );
 }

@@ -6,6 +6,7 @@ use texmap::Texture;
 
 use crate::catalogue::MAX_TEXELS;
 use crate::colour::Ramp::{self, Azure, Gold, Indigo, Pearl, Rose, Teal, Violet};
+use crate::font::covers;
 use crate::noise::{ONE, fractal, hash};
 use crate::trig::{cos, sin};
 
@@ -20,39 +21,6 @@ pub fn paint(texels: &mut [u8; MAX_TEXELS], texel: fn(i64, i64) -> u8) -> Textur
         }
     }
     Texture::new(texels, SIDE as u16, SIDE as u16).expect("there are SIDE x SIDE texels")
-}
-
-/// Glyphs, five columns by seven rows.
-#[rustfmt::skip]
-const GLYPHS: [(u8, [&[u8; 5]; 7]); 19] = [
-    (b'1', [b"..#..", b".##..", b"..#..", b"..#..", b"..#..", b"..#..", b".###."]),
-    (b'2', [b".###.", b"#...#", b"....#", b"...#.", b"..#..", b".#...", b"#####"]),
-    (b'3', [b".###.", b"#...#", b"....#", b"..##.", b"....#", b"#...#", b".###."]),
-    (b'4', [b"...#.", b"..##.", b".#.#.", b"#..#.", b"#####", b"...#.", b"...#."]),
-    (b'5', [b"#####", b"#....", b"####.", b"....#", b"....#", b"#...#", b".###."]),
-    (b'6', [b".###.", b"#....", b"#....", b"####.", b"#...#", b"#...#", b".###."]),
-    (b'7', [b"#####", b"....#", b"...#.", b"...#.", b"..#..", b"..#..", b"..#.."]),
-    (b'8', [b".###.", b"#...#", b"#...#", b".###.", b"#...#", b"#...#", b".###."]),
-    (b'A', [b".###.", b"#...#", b"#...#", b"#####", b"#...#", b"#...#", b"#...#"]),
-    (b'B', [b"####.", b"#...#", b"#...#", b"####.", b"#...#", b"#...#", b"####."]),
-    (b'C', [b".###.", b"#...#", b"#....", b"#....", b"#....", b"#...#", b".###."]),
-    (b'D', [b"####.", b"#...#", b"#...#", b"#...#", b"#...#", b"#...#", b"####."]),
-    (b'E', [b"#####", b"#....", b"#....", b"####.", b"#....", b"#....", b"#####"]),
-    (b'F', [b"#####", b"#....", b"#....", b"####.", b"#....", b"#....", b"#...."]),
-    (b'G', [b".###.", b"#...#", b"#....", b"#.###", b"#...#", b"#...#", b".###."]),
-    (b'H', [b"#...#", b"#...#", b"#...#", b"#####", b"#...#", b"#...#", b"#...#"]),
-    (b'N', [b"#...#", b"##..#", b"##..#", b"#.#.#", b"#..##", b"#..##", b"#...#"]),
-    (b'S', [b".####", b"#....", b"#....", b".###.", b"....#", b"....#", b"####."]),
-    (b'W', [b"#...#", b"#...#", b"#...#", b"#.#.#", b"#.#.#", b"#.#.#", b".#.#."]),
-];
-
-/// Whether a letter or figure covers a place, (0, 0) being its top left, five by seven.
-fn in_glyph(glyph: u8, x: i64, y: i64) -> bool {
-    if !(0..5).contains(&x) || !(0..7).contains(&y) {
-        return false;
-    }
-    let drawn = GLYPHS.iter().find(|(known, _)| *known == glyph);
-    drawn.is_some_and(|(_, rows)| rows[y as usize][x as usize] == b'#')
 }
 
 /// A shade of a ramp, kept to what leaves the highlight room.
@@ -145,7 +113,7 @@ pub fn dial(i: i64, j: i64) -> u8 {
         170..174 | 182..185 | 226..229 | 235.. if radius < 238 => Indigo.shade(2),
         174..182 => shade(Gold, 14 + lit),
         185..226 => {
-            let letter = [b'N', b'E', b'S', b'W'];
+            let letter = ['N', 'E', 'S', 'W'];
             let nearest = angle.wrapping_add(1 << 29) >> 30;
             // Upright for who stands in the middle and looks outward.
             let (across, out) = match nearest {
@@ -155,7 +123,7 @@ pub fn dial(i: i64, j: i64) -> u8 {
                 _ => (-dy, -dx),
             };
             let (x, y) = ((across + 10).div_euclid(4), (220 - out).div_euclid(4));
-            if in_glyph(letter[nearest as usize], x, y) {
+            if covers(letter[nearest as usize], x, y) {
                 return shade(Gold, 20);
             }
             let near_letter = from_ray(angle, 4).0 < 1 << 29;
@@ -213,10 +181,10 @@ pub fn board(i: i64, j: i64) -> u8 {
     if from_edge == 1 {
         return Indigo.shade(2);
     }
-    let letter = b'A' + column as u8;
-    let figure = b'8' - row as u8;
+    let letter = char::from(b'A' + column as u8);
+    let figure = char::from(b'8' - row as u8);
     let (glyph_x, glyph_y) = ((x - 5).div_euclid(2), (y - 9).div_euclid(2));
-    let written = |x: i64, y: i64| in_glyph(letter, x, y) || in_glyph(figure, x - 6, y);
+    let written = |x: i64, y: i64| covers(letter, x, y) || covers(figure, x - 6, y);
     if written(glyph_x, glyph_y) {
         return if dark {
             shade(Gold, 21)

@@ -25,7 +25,7 @@ pub struct Key {
     pub about: &'static str,
 }
 
-/// Every key that does something, each action once.
+/// Every key that does something; of the actions each once, but for the hint that names a key.
 pub const KEYS: &[Key] = &[
     key(
         "Left",
@@ -105,6 +105,18 @@ pub const KEYS: &[Key] = &[
         [KeyCode::O; 2],
         Action::NextOrder,
         "next order: polygons, planes, buffer",
+    ),
+    key(
+        "H",
+        [KeyCode::H, KeyCode::F1],
+        Action::Help,
+        "help: the keys",
+    ),
+    key(
+        "I",
+        [KeyCode::I; 2],
+        Action::Info,
+        "info: what the pictures take",
     ),
     key(
         "R",
@@ -206,7 +218,8 @@ mod tests {
     fn every_action_has_a_key_and_no_key_two() {
         for (name, action) in Action::ALL {
             let with = KEYS.iter().filter(|key| key.action == action);
-            assert_eq!(with.count(), 1, "{name}");
+            let one = usize::from(action != Action::Hint);
+            assert_eq!(with.count(), one, "{name}");
         }
         let mut codes: Vec<_> = KEYS.iter().flat_map(|key| key.codes).collect();
         let all = codes.len();

@@ -14,6 +14,7 @@
 #![forbid(unsafe_code)]
 
 mod keys;
+mod overlay;
 mod steering;
 
 use core::fmt;
@@ -31,6 +32,7 @@ use texmap::{Mapper, Order, Stats};
 
 use keys::Keyboard;
 pub use keys::{KEYS, Key};
+use overlay::{Figures, Overlay, Writing};
 use steering::{Log, NotNoted, Notes, Scenes, State};
 
 /// The program's version, as its first line and `version` tell it.
@@ -47,6 +49,7 @@ pub struct Memory {
     storage: Storage,
     offscreen: Offscreen,
     notes: Notes,
+    writing: Writing,
 }
 
 impl Memory {
@@ -58,6 +61,7 @@ impl Memory {
             storage: Storage::new(),
             offscreen: Offscreen::new(),
             notes: Log::NOTES,
+            writing: Writing::new(),
         }
     }
 }
@@ -97,6 +101,7 @@ pub struct Show<'a, B> {
     /// What the next picture depends on, and what that came from.
     state: State<'a>,
     log: Log<'a>,
+    overlay: Overlay<'a>,
     keyboard: Keyboard,
     /// The keyboard's codes: taken, and lost before.
     codes: (u32, u32),
@@ -129,6 +134,7 @@ impl<'a, B: Bus> Show<'a, B> {
             pack: pack.map(Pack::checksum),
             state,
             log: Log::new(state, &mut memory.notes),
+            overlay: Overlay::new(&mut memory.writing, stage.palette()),
             keyboard: Keyboard::new(),
             codes: (0, 0),
             texels: &mut memory.texels,
@@ -163,6 +169,11 @@ impl<'a, B: Bus> Show<'a, B> {
         if before.is_none() {
             out(format_args!("{RUNNING}"));
         }
+    }
+
+    /// Says how many microseconds the last picture took: only the machine has a clock for that.
+    pub fn took(&mut self, micros: u32) {
+        self.overlay.took(micros);
     }
 
     /// Takes a code of the keyboard, scan code set 1. A held show is not steered by keys.
@@ -225,7 +236,7 @@ impl<'a, B: Bus> Show<'a, B> {
                 if self.pace.is_some() {
                     self.hold();
                 }
-                self.draw(picture, &pose);
+                self.draw(picture, &pose, false);
                 self.tell_page(out);
             }
             Command::ShowAt(tick) => {
@@ -284,16 +295,24 @@ impl<'a, B: Bus> Show<'a, B> {
     }
 
     /// Draws a picture on the next page, and flips.
-    fn draw(&mut self, picture: Picture, pose: &Pose) {
+    fn draw(&mut self, picture: Picture, pose: &Pose, overlay: bool) {
         self.card.bus().take_counts();
         let background = self.stage.background();
         self.drawn = match self.stage.order() {
             Order::Polygons | Order::Planes => {
-                self.stage.draw(pose, &mut self.card.begin(background))
+                let mut page = self.card.begin(background);
+                let drawn = self.stage.draw(pose, &mut page);
+                if overlay {
+                    self.overlay.draw(page.overlay());
+                }
+                drawn
             }
             Order::Buffer => {
                 self.offscreen.begin(background);
                 let drawn = self.stage.draw(pose, self.offscreen);
+                if overlay {
+                    self.overlay.draw(self.offscreen);
+                }
                 self.card.present(self.offscreen);
                 drawn
             }
@@ -307,20 +326,36 @@ impl<'a, B: Bus> Show<'a, B> {
     fn draw_at(&mut self, tick: u32) {
         let pose = self.state.pose(tick);
         let own = pose == self.state.entry.pose(tick);
-        self.draw(
-            if own {
-                Picture::Frame(tick)
-            } else {
-                name(&pose)
-            },
-            &pose,
-        );
+        let picture = if own {
+            Picture::Frame(tick)
+        } else {
+            name(&pose)
+        };
+        let overlay = self.pace.is_some() && self.prepare_overlay(tick);
+        self.draw(picture, &pose, overlay);
+    }
+
+    /// Whether there is an overlay for the picture of a tick; if so it is ready.
+    fn prepare_overlay(&mut self, tick: u32) -> bool {
+        let counts = self.card.bus().counts();
+        let figures = Figures {
+            scene: self.state.entry.name,
+            mapper: self.state.mapper,
+            order: self.state.order,
+            paused: self.state.is_paused(),
+            pixels: self.drawn.pixels,
+            map_masks: counts.draw.map_mask + counts.erase.map_mask,
+        };
+        self.overlay.prepare(tick, &figures)
     }
 
     /// Changes the running show at the first tick that has no picture yet, and notes it.
     fn steer(&mut self, tick: u32, change: Change) -> Result<(), steering::Unknown> {
         let drawn = self.pace.is_some_and(|pace| pace.last == Some(tick));
         let tick = if drawn { tick.wrapping_add(1) } else { tick };
+        if let Change::Act(action) = change {
+            self.overlay.act(tick, action);
+        }
         let mut next = self.state;
         let changed = next.change(tick, &change)?;
         self.adopt(next);
@@ -347,6 +382,10 @@ impl<'a, B: Bus> Show<'a, B> {
                 out(format_args!(
                     "{ERROR} the show runs: it is steered now, without a tick"
                 ));
+                return None;
+            }
+            (false, _) if matches!(change, Change::Act(action) if action.is_overlay()) => {
+                out(format_args!("{ERROR} a held show has no overlay"));
                 return None;
             }
             (false, None) => {
@@ -398,12 +437,14 @@ impl<'a, B: Bus> Show<'a, B> {
     /// and background are others.
     fn adopt(&mut self, state: State<'a>) {
         let entry = state.entry;
+        self.overlay.renew();
         self.stage.set_mapper(state.mapper);
         self.stage.set_order(state.order);
         if entry.name != self.state.entry.name {
             let textures = [entry.paint(self.texels)];
             self.stage.set(entry.scene(&textures));
             self.offscreen.forget();
+            self.overlay.set_palette(self.stage.palette());
             self.reset();
         }
         self.state = state;
@@ -442,6 +483,7 @@ impl<'a, B: Bus> Show<'a, B> {
     /// alone, and not on how far the show had come.
     fn hold(&mut self) {
         self.pace = None;
+        self.overlay.close();
         self.reset();
     }
 

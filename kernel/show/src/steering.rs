@@ -253,6 +253,11 @@ impl<'a> State<'a> {
         self.motion.at(tick).pose(|tick| self.entry.pose(tick))
     }
 
+    /// Whether nothing moves until that is said again.
+    pub fn is_paused(&self) -> bool {
+        self.motion.paused
+    }
+
     /// Changes it at a tick, not before the last change. Whether that changes anything.
     ///
     /// # Errors
@@ -312,6 +317,7 @@ impl<'a> State<'a> {
                 self.order = Order::ALL[next].1;
             }
             Action::Reset => *self = Self::of(self.scenes, entry),
+            Action::Help | Action::Info | Action::Hint => {}
         }
     }
 

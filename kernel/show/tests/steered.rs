@@ -50,15 +50,22 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
     let mut memory = Box::new(Memory::new());
     let mut show = Show::new(&mut memory, Vga::new(), None);
     let (mut tick, mut seen) = (random.u32(..1000), Vec::new());
-    for picture in 0..60 {
+    for picture in 0..80 {
         show.present(tick, &mut |_| {});
-        seen.push((tick, evidence(&mut show, tick)));
+        // A picture that is written over is another one; those after it are as they were.
+        if picture / 10 % 2 == 0 {
+            seen.push((tick, evidence(&mut show, tick)));
+        }
+        if picture % 10 == 9 {
+            let overlay = if picture < 40 { "help" } else { "info" };
+            done(&mut show, &format!("steer {overlay}"), tick);
+        }
         // Some come after the picture of their tick, some before that of theirs.
         for _ in 0..random.usize(..4) {
             let (_, action) = Action::ALL[random.usize(..Action::ALL.len())];
             match random.u8(..8) {
                 // What was before is not in the log then.
-                _ if action == Action::Reset => {}
+                _ if action == Action::Reset || action.is_overlay() => {}
                 0 => LEFT
                     .iter()
                     .chain(&PAGE_UP)
@@ -92,7 +99,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
         }
     }
     // A picture's name is enough to draw it.
-    let (tick, shown) = &seen[50];
+    let (tick, shown) = &seen[seen.len() / 2];
     done(&mut show, &format!("show at {tick}"), 0);
     let picture = shown
         .iter()
@@ -152,6 +159,8 @@ fn what_cannot_be_steered_is_told() {
     refused(&mut show, "steer mapper none", "no mapper 'none'");
     refused(&mut show, "mapper none", "no mapper 'none'");
     done(&mut show, "hold", 3);
+    refused(&mut show, "steer 5 help", "has no overlay");
+    refused(&mut show, "steer info", "has no overlay");
     refused(&mut show, "steer stop", "a tick has to be said");
     refused(&mut show, "steer 5 scene none", "no scene 'none'");
     done(&mut show, "steer 5 stop", 3);
@@ -210,4 +219,63 @@ fn keys_are_listed_with_what_they_do() {
         done(&mut show, "counts", 0).last().unwrap(),
         "keys taken 1 lost 2"
     );
+}
+
+/// What is written costs four writes to Map Mask, and none when it is drawn into RAM first.
+#[test]
+fn an_overlay_is_counted_apart_and_goes_again() {
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut tick = 0;
+    let mut present = |show: &mut Show<'_, Vga>| {
+        tick += 1;
+        show.present(tick, &mut |_| {});
+        show.took(2500);
+        let counts = done(show, "counts", tick);
+        let [draw, overlay] = ["draw ", "overlay "].map(|purpose| {
+            counts
+                .iter()
+                .find_map(|line| line.strip_prefix(purpose))
+                .unwrap()
+                .to_string()
+        });
+        (draw, overlay)
+    };
+    const NONE: &str = "ports 0 map-mask 0 stores 0 bytes 0";
+    // Until the pages have been drawn on, they are erased whole.
+    for _ in 0..3 {
+        present(&mut show);
+    }
+    let (bare, overlay) = present(&mut show);
+    assert_eq!(overlay, NONE);
+    for name in ["help", "info", "hint"] {
+        done(&mut show, &format!("steer {name}"), 1);
+        for _ in 0..4 {
+            let (draw, overlay) = present(&mut show);
+            assert!(
+                overlay.starts_with("ports 4 map-mask 4 stores "),
+                "{name}: {overlay}"
+            );
+            // A tick further the ball has some pixels and columns more or less.
+            let columns = |text: &str| text.split(' ').nth(1).unwrap().parse::<i32>().unwrap();
+            assert!(
+                (columns(&draw) - columns(&bare)).abs() < 100,
+                "{draw}, not {bare}"
+            );
+        }
+        done(&mut show, "order buffer", 1);
+        let (draw, overlay) = present(&mut show);
+        assert!(
+            draw.starts_with("ports 4 map-mask 4 ") && overlay == NONE,
+            "{draw}; {overlay}"
+        );
+        done(&mut show, "order polygons", 1);
+        if name != "hint" {
+            done(&mut show, &format!("steer {name}"), 1);
+            assert_eq!(present(&mut show).1, NONE, "{name}");
+        }
+    }
+    // The hint goes by itself, 300 ticks after it was asked for.
+    let gone = (0..400).find(|_| present(&mut show).1 == NONE).unwrap();
+    assert!((250..300).contains(&gone), "{gone}");
 }

@@ -15,6 +15,32 @@ pub fn now() -> u64 {
     u64::from(high) << 32 | u64::from(low)
 }
 
+/// Tells how long something took: by the time stamp counter, and by the ticks that have passed, which
+/// say how fast that counts.
+#[derive(Clone, Copy, Debug)]
+pub struct Stopwatch {
+    began: u64,
+    tick: u32,
+}
+
+impl Stopwatch {
+    /// Begins to compare the two.
+    pub fn start(tick: u32) -> Self {
+        Self { began: now(), tick }
+    }
+
+    /// The microseconds since the counter was at `since`. The longer ago the start, the more exact:
+    /// after a second within 2 %.
+    pub fn micros(&self, since: u64, tick: u32) -> u32 {
+        let now = now();
+        let ticks = tick.wrapping_sub(self.tick);
+        let counted = now.saturating_sub(self.began).max(1);
+        let passed = u128::from(ticks) * 1_000_000 / u128::from(super::timer::RATE);
+        let micros = u128::from(now.saturating_sub(since)) * passed / u128::from(counted);
+        micros.try_into().unwrap_or(u32::MAX)
+    }
+}
+
 /// Carries out `count` instructions in a loop of two, and the same few around it for every count.
 #[inline(never)]
 pub fn instructions(count: u32) {

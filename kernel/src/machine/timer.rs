@@ -9,7 +9,7 @@ use super::ports;
 /// The timer's input clock in Hz (14.31818 MHz / 12).
 const CLOCK: u32 = 1_193_182;
 /// Ticks a second.
-const RATE: u32 = 60;
+pub const RATE: u32 = 60;
 /// 60.0011 Hz.
 const DIVISOR: u16 = (CLOCK / RATE) as u16;
 

@@ -1,0 +1,497 @@
+//! What is written over a running show: the keys, figures of the pictures, and a hint.
+//!
+//! Writing is white or yellow, with a black outline, so that it reads on any picture. It is drawn
+//! after the picture and counted apart; plane after plane, so that all of it takes four writes to Map
+//! Mask, and as columns, a run of pixels at a time. The pages know what they were drawn on, so nothing
+//! else has to remember where something was written.
+//!
+//! The figures are those of the half second before, or they could not be read. None of this exists
+//! while the show is held.
+
+use core::array;
+use core::fmt::{self, Write};
+
+use link::Action;
+use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH};
+use scene::font;
+use texmap::{Mapper, Order};
+
+use crate::KEYS;
+
+/// Ticks between one writing of the figures and the next.
+const RENEWAL: u32 = 30;
+/// Ticks that a hint stays.
+const HINT: u32 = 300;
+/// Columns from a letter to the next.
+const ADVANCE: usize = font::WIDTH + 1;
+/// Lines from one line of letters to the next.
+const LINE: usize = font::HEIGHT + 2;
+/// Where the writing begins.
+const MARGIN: usize = 4;
+
+/// What writing can be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Ink {
+    /// White.
+    Plain,
+    /// Yellow, for what stands out.
+    Bright,
+}
+
+/// The pixels of a screen column, from the top down, as bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Column([u64; HEIGHT.div_ceil(64)]);
+
+impl Column {
+    const EMPTY: Self = Self([0; HEIGHT.div_ceil(64)]);
+
+    fn set(&mut self, y: usize) {
+        self.0[y / 64] |= 1 << (y % 64);
+    }
+
+    fn has(&self, y: usize) -> bool {
+        self.0[y / 64] >> (y % 64) & 1 == 1
+    }
+
+    fn or(self, other: Self) -> Self {
+        Self(array::from_fn(|i| self.0[i] | other.0[i]))
+    }
+
+    /// With the pixels above and below each one.
+    fn spread(self) -> Self {
+        let word = |i: usize| self.0.get(i).copied().unwrap_or(0);
+        Self(array::from_fn(|i| {
+            let down = word(i) << 1 | word(i.wrapping_sub(1)) >> 63;
+            let up = word(i) >> 1 | word(i + 1) << 63;
+            word(i) | down | up
+        }))
+    }
+
+    /// The first pixel from `y` on that is set, or is not.
+    fn next(&self, y: usize, set: bool) -> usize {
+        let mut from = y;
+        while from < HEIGHT {
+            let word = if set {
+                self.0[from / 64]
+            } else {
+                !self.0[from / 64]
+            };
+            match (word >> (from % 64)).trailing_zeros() {
+                64 => from = (from / 64 + 1) * 64,
+                ahead => return (from + ahead as usize).min(HEIGHT),
+            }
+        }
+        HEIGHT
+    }
+
+    /// Each run of pixels that are set: its first, and the one after its last.
+    fn runs(self) -> impl Iterator<Item = (usize, usize)> {
+        let mut y = 0;
+        core::iter::from_fn(move || {
+            let top = self.next(y, true);
+            y = self.next(top, false);
+            (top < HEIGHT).then_some((top, y))
+        })
+    }
+}
+
+/// Writing on the screen, a bit a pixel. About 20 KiB, all zeros when empty.
+#[derive(Debug)]
+pub(crate) struct Writing {
+    plain: [Column; WIDTH],
+    bright: [Column; WIDTH],
+}
+
+impl Writing {
+    /// Nothing written.
+    pub const fn new() -> Self {
+        Self {
+            plain: [Column::EMPTY; WIDTH],
+            bright: [Column::EMPTY; WIDTH],
+        }
+    }
+
+    /// Wipes everything.
+    pub fn wipe(&mut self) {
+        self.plain = [Column::EMPTY; WIDTH];
+        self.bright = [Column::EMPTY; WIDTH];
+    }
+
+    /// Writes a line with its top left at (x, y), and returns the column after it. What leaves the
+    /// screen, or its outline would, is left out.
+    pub fn write(&mut self, ink: Ink, x: usize, y: usize, text: fmt::Arguments<'_>) -> usize {
+        let mut pen = Pen {
+            columns: match ink {
+                Ink::Plain => &mut self.plain,
+                Ink::Bright => &mut self.bright,
+            },
+            x,
+            y,
+        };
+        // The pen never fails, and what a Display implementation makes of that is its own.
+        let _ = pen.write_fmt(text);
+        pen.x
+    }
+
+    /// Draws it.
+    pub fn draw(&self, inks: &Inks, destination: &mut impl Destination) {
+        let at = |x: usize| match (self.plain.get(x), self.bright.get(x)) {
+            (Some(plain), Some(bright)) => plain.or(*bright),
+            _ => Column::EMPTY,
+        };
+        for plane in 0..4 {
+            destination.select(plane as u16);
+            for x in (plane..WIDTH).step_by(4) {
+                let around = at(x.wrapping_sub(1)).or(at(x)).or(at(x + 1)).spread();
+                for (top, end) in around.runs() {
+                    let mut y = top;
+                    destination.lane::<{ modex::STRIDE }>(
+                        x as u16,
+                        top as u16,
+                        (end - top) as u16,
+                        |column| {
+                            column.fill(|| {
+                                let here = y;
+                                y += 1;
+                                match (self.plain[x].has(here), self.bright[x].has(here)) {
+                                    (true, _) => inks.plain,
+                                    (_, true) => inks.bright,
+                                    _ => inks.outline,
+                                }
+                            });
+                        },
+                    );
+                }
+            }
+        }
+    }
+}
+
+/// Where the next letter goes.
+struct Pen<'a> {
+    columns: &'a mut [Column; WIDTH],
+    x: usize,
+    y: usize,
+}
+
+impl Write for Pen<'_> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        for character in text.chars() {
+            for (row, bits) in font::glyph(character).into_iter().enumerate() {
+                for column in (0..font::WIDTH).filter(|column| bits >> column & 1 == 1) {
+                    let (x, y) = (self.x + column, self.y + row);
+                    if (1..WIDTH - 1).contains(&x) && (1..HEIGHT - 1).contains(&y) {
+                        self.columns[x].set(y);
+                    }
+                }
+            }
+            self.x += ADVANCE;
+        }
+        Ok(())
+    }
+}
+
+/// The colours of writing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Inks {
+    plain: u8,
+    bright: u8,
+    outline: u8,
+}
+
+impl Inks {
+    /// Those of a palette, whatever it holds.
+    pub fn of(palette: &Palette) -> Self {
+        Self {
+            plain: nearest(palette, [63, 63, 63]),
+            bright: nearest(palette, [63, 58, 24]),
+            outline: nearest(palette, [0, 0, 0]),
+        }
+    }
+}
+
+/// The entry of a palette that is nearest to a colour.
+pub(crate) fn nearest(palette: &Palette, colour: Rgb6) -> u8 {
+    let distance = |entry: &Rgb6| -> u32 {
+        let parts = entry.iter().zip(colour);
+        parts.map(|(&a, b)| u32::from(a.abs_diff(b)).pow(2)).sum()
+    };
+    let entries = (0..=u8::MAX).zip(palette);
+    let nearest = entries.min_by_key(|(_, entry)| distance(entry));
+    nearest.map_or(0, |(index, _)| index)
+}
+
+/// What is told of the pictures.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Figures {
+    pub scene: &'static str,
+    pub mapper: Mapper,
+    pub order: Order,
+    pub paused: bool,
+    /// Of the last picture.
+    pub pixels: u32,
+    /// Of the last picture, its overlay aside.
+    pub map_masks: u64,
+}
+
+/// Pictures since a tick.
+#[derive(Clone, Copy, Debug, Default)]
+struct Window {
+    since: u32,
+    pictures: u32,
+    micros: u64,
+}
+
+/// What is written over the pictures, and when it was.
+#[derive(Debug)]
+pub(crate) struct Overlay<'a> {
+    writing: &'a mut Writing,
+    inks: Inks,
+    help: bool,
+    info: bool,
+    hint: Option<u32>,
+    /// Something else is to be written than is.
+    stale: bool,
+    window: Window,
+    /// The last window that was whole: tenths of a picture a second, microseconds a picture.
+    pace: Option<(u32, u32)>,
+}
+
+impl<'a> Overlay<'a> {
+    /// Nothing, to be written in the colours of `palette`.
+    pub fn new(writing: &'a mut Writing, palette: &Palette) -> Self {
+        Self {
+            writing,
+            inks: Inks::of(palette),
+            help: false,
+            info: false,
+            hint: None,
+            stale: true,
+            window: Window::default(),
+            pace: None,
+        }
+    }
+
+    /// Nothing any more.
+    pub fn close(&mut self) {
+        (self.help, self.info, self.hint) = (false, false, None);
+        self.stale = true;
+    }
+
+    /// What is told has changed.
+    pub fn renew(&mut self) {
+        self.stale = true;
+    }
+
+    /// The palette is another one.
+    pub fn set_palette(&mut self, palette: &Palette) {
+        self.inks = Inks::of(palette);
+    }
+
+    /// Takes an action, if it is the overlay's.
+    pub fn act(&mut self, tick: u32, action: Action) {
+        match action {
+            Action::Help => self.help = !self.help,
+            Action::Info => self.info = !self.info,
+            Action::Hint => self.hint = Some(tick),
+            _ => return,
+        }
+        self.stale = true;
+    }
+
+    /// A picture took so many microseconds.
+    pub fn took(&mut self, micros: u32) {
+        self.window.micros += u64::from(micros);
+    }
+
+    /// Whether there is anything to draw over the picture of `tick`; if so it is written.
+    pub fn prepare(&mut self, tick: u32, figures: &Figures) -> bool {
+        let ticks = tick.wrapping_sub(self.window.since);
+        if ticks >= RENEWAL {
+            let Window {
+                pictures, micros, ..
+            } = self.window;
+            // Not of pictures that were not shown: the show may just have begun.
+            if pictures > 0 && ticks < 100 * RENEWAL {
+                let tenths = pictures * 600 / ticks;
+                self.pace = Some((tenths, (micros / u64::from(pictures)) as u32));
+            }
+            self.window = Window {
+                since: tick,
+                ..Window::default()
+            };
+            self.stale |= self.info;
+        }
+        self.window.pictures += 1;
+        if self
+            .hint
+            .is_some_and(|since| tick.wrapping_sub(since) >= HINT)
+        {
+            self.hint = None;
+            self.stale = true;
+        }
+        if core::mem::take(&mut self.stale) {
+            self.writing.wipe();
+            if self.help {
+                self.write_help();
+            } else {
+                if self.info {
+                    self.write_info(figures);
+                }
+                if self.hint.is_some() {
+                    let text = "H: help";
+                    let x = (WIDTH - text.len() * ADVANCE) / 2;
+                    let y = HEIGHT - MARGIN - font::HEIGHT;
+                    self.writing.write(Ink::Plain, x, y, format_args!("{text}"));
+                }
+            }
+        }
+        self.help || self.info || self.hint.is_some()
+    }
+
+    /// Draws what was prepared.
+    pub fn draw(&self, destination: &mut impl Destination) {
+        self.writing.draw(&self.inks, destination);
+    }
+
+    fn write_help(&mut self) {
+        let about = MARGIN + 6 * ADVANCE;
+        for (i, key) in KEYS.iter().enumerate() {
+            let y = MARGIN + i * LINE;
+            self.writing
+                .write(Ink::Bright, MARGIN, y, format_args!("{}", key.name));
+            self.writing
+                .write(Ink::Plain, about, y, format_args!("{}", key.about));
+        }
+    }
+
+    fn write_info(&mut self, figures: &Figures) {
+        let Figures {
+            scene,
+            mapper,
+            order,
+            paused,
+            pixels,
+            map_masks,
+        } = figures;
+        let (pace, writing) = (self.pace, &mut *self.writing);
+        let mut y = MARGIN;
+        let mut line = |ink, text: fmt::Arguments<'_>| {
+            writing.write(ink, MARGIN, y, text);
+            y += LINE;
+        };
+        line(Ink::Bright, format_args!("{scene}"));
+        line(Ink::Bright, format_args!("{mapper}  {order}"));
+        if let Some((tenths, micros)) = pace {
+            line(
+                Ink::Plain,
+                format_args!(
+                    "{}.{} frames/s  {}.{:02} ms",
+                    tenths / 10,
+                    tenths % 10,
+                    micros / 1000,
+                    micros / 10 % 100
+                ),
+            );
+        }
+        line(Ink::Plain, format_args!("{pixels} pixels"));
+        line(Ink::Plain, format_args!("{map_masks} Map Masks"));
+        if let Mapper::Within(tolerance) = mapper {
+            line(Ink::Plain, format_args!("at most {tolerance} texel off"));
+        }
+        if *paused {
+            line(Ink::Bright, format_args!("paused"));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use modex::PlanarBuffer;
+    use scene::catalogue::CATALOGUE;
+    use std::boxed::Box;
+    use std::string::String;
+
+    const INKS: Inks = Inks {
+        plain: 1,
+        bright: 2,
+        outline: 3,
+    };
+
+    /// By the definition: a letter's pixels in its ink, those around them black, and no other.
+    #[test]
+    fn letters_have_an_outline_and_touch_nothing_else() {
+        let mut writing = Box::new(Writing::new());
+        for (x, y) in [(4, 4), (61, 60), (318, 232), (200, 239), (0, 0)] {
+            writing.write(Ink::Plain, x, y, format_args!("K%"));
+            writing.write(Ink::Bright, x, y.wrapping_add(9), format_args!("Z"));
+        }
+        let mut page = Box::new(PlanarBuffer::new());
+        writing.draw(&INKS, &mut *page);
+        let ink = |x: usize, y: usize| {
+            let of =
+                |columns: &[Column; WIDTH]| columns.get(x).is_some_and(|c| y < HEIGHT && c.has(y));
+            [of(&writing.plain), of(&writing.bright)]
+        };
+        let mut count = [0; 4];
+        for y in 0..HEIGHT {
+            for x in 0..WIDTH {
+                let near =
+                    |dx: usize, dy: usize| ink((x + dx).wrapping_sub(1), (y + dy).wrapping_sub(1));
+                let around = (0..9).any(|i| near(i % 3, i / 3) != [false; 2]);
+                let expected = match ink(x, y) {
+                    [true, _] => 1,
+                    [_, true] => 2,
+                    _ if around => 3,
+                    _ => 0,
+                };
+                assert_eq!(page.pixel(x, y), expected, "({x}, {y})");
+                count[usize::from(expected)] += 1;
+            }
+        }
+        assert!(count.iter().all(|&count| count > 30), "{count:?}");
+    }
+
+    #[test]
+    fn everything_that_is_written_has_letters() {
+        let mut written = String::new();
+        for key in KEYS {
+            written += key.name;
+            written += key.about;
+        }
+        written.extend(CATALOGUE.iter().map(|entry| entry.name));
+        written.extend(Mapper::ALL.iter().map(|(name, ..)| *name));
+        written.extend(Order::ALL.iter().map(|(name, ..)| *name));
+        for character in written.chars().filter(|character| *character != ' ') {
+            assert_ne!(font::glyph(character), [0; font::HEIGHT], "{character}");
+        }
+        let longest = KEYS.iter().map(|key| key.about.len()).max().unwrap();
+        assert!(MARGIN + (6 + longest) * ADVANCE < WIDTH, "{longest}");
+        assert!(MARGIN + KEYS.len() * LINE < HEIGHT);
+    }
+
+    #[test]
+    fn a_palette_has_its_nearest_to_white_yellow_and_black() {
+        let inks = Inks::of(CATALOGUE[0].scene(&[]).palette);
+        assert_eq!(
+            inks,
+            Inks {
+                plain: 1,
+                bright: 2,
+                outline: 0
+            }
+        );
+        let mut palette = [[30; 3]; 256];
+        (palette[7], palette[255], palette[9]) = ([60, 61, 62], [3, 0, 0], [50, 50, 0]);
+        assert_eq!(
+            Inks::of(&palette),
+            Inks {
+                plain: 7,
+                bright: 9,
+                outline: 255
+            }
+        );
+    }
+}
