@@ -50,6 +50,8 @@ pub enum Action {
     Help,
     /// `info`: figures of the pictures, written over them, or no more.
     Info,
+    /// `split`: the picture three times, as it is, exact, and its error, or no more.
+    Split,
     /// `hint`: for five seconds, which key is help.
     Hint,
     /// `reset`: move as the scene does, with the default settings. The scene stays.
@@ -58,7 +60,7 @@ pub enum Action {
 
 impl Action {
     /// Every action with its name on the line.
-    pub const ALL: [(&'static str, Self); 23] = [
+    pub const ALL: [(&'static str, Self); 24] = [
         ("yaw-left", Self::YawLeft),
         ("yaw-right", Self::YawRight),
         ("pitch-up", Self::PitchUp),
@@ -80,14 +82,15 @@ impl Action {
         ("next-order", Self::NextOrder),
         ("help", Self::Help),
         ("info", Self::Info),
+        ("split", Self::Split),
         ("hint", Self::Hint),
         ("reset", Self::Reset),
     ];
 
-    /// Whether it changes nothing but what is written over the picture. A log has none of these, and
+    /// Whether it changes nothing but how a running show is looked at. A log has none of these, and
     /// a held show no use for them.
     pub const fn is_overlay(self) -> bool {
-        matches!(self, Self::Help | Self::Info | Self::Hint)
+        matches!(self, Self::Help | Self::Info | Self::Split | Self::Hint)
     }
 
     /// The action of a name.

@@ -78,7 +78,16 @@ pub struct Lane<'a, const STEP: usize> {
     lent: PhantomData<&'a mut u8>,
 }
 
-impl<const STEP: usize> Lane<'_, STEP> {
+impl<'a, const STEP: usize> Lane<'a, STEP> {
+    /// The first byte of a slice, and every `STEP`th after it.
+    pub fn over(bytes: &'a mut [u8]) -> Self {
+        let len = bytes.len().div_ceil(STEP);
+        assert!(len <= usize::from(u16::MAX), "{len} pixels in a lane");
+        // SAFETY: the slice spans the lane from its first byte to its last, and its exclusive borrow
+        // lives as long as the lane.
+        unsafe { Self::new(NonNull::from(bytes).cast(), len as u16) }
+    }
+
     /// A lane of `len` bytes from `base`.
     ///
     /// # Safety

@@ -18,8 +18,8 @@
 //!   safe on every card.
 //!
 //! [`Destination`] is the one contract by which a texture mapper reaches pixels; [`Canvas`]
-//! (a page of the card), [`PlanarBuffer`] (the same shape in RAM) and [`Offscreen`] (one that can be
-//! presented) implement it.
+//! (a page of the card), [`PlanarBuffer`] (the same shape in RAM), [`Offscreen`] (one that can be
+//! presented) and [`Window`] (a part of any of them) implement it.
 #![no_std]
 
 mod bus;
@@ -29,6 +29,7 @@ mod driver;
 mod offscreen;
 mod planar;
 pub mod registers;
+mod window;
 
 pub use bus::{Bus, Purpose};
 pub use column::{Column, Destination, Lane};
@@ -36,6 +37,7 @@ pub use count::{Counted, Counts, Tally};
 pub use driver::{Canvas, ModeX, Palette, Readback, Rgb6};
 pub use offscreen::Offscreen;
 pub use planar::PlanarBuffer;
+pub use window::Window;
 
 /// Pixels in a line.
 pub const WIDTH: usize = 320;

@@ -1,7 +1,5 @@
 //! A page in RAM, in the shape that the card has it.
 
-use core::ptr::NonNull;
-
 use crate::column::check_row;
 use crate::driver::check_lane;
 use crate::{Destination, HEIGHT, Lane, PAGE_BYTES, STRIDE, WIDTH};
@@ -61,10 +59,7 @@ impl Destination for PlanarBuffer {
         let (x, top, bytes) = (usize::from(x), usize::from(y), usize::from(len) - 1);
         let plane = &mut self.planes[x & 3];
         let bytes = &mut plane[top * STRIDE + x / 4..][..bytes * STEP + 1];
-        let base = NonNull::from(bytes).cast::<u8>();
-        // SAFETY: the slice spans the lane from its first byte to its last, it was cut with
-        // bounds checks, and its exclusive borrow lives until `draw` returns.
-        draw(unsafe { Lane::new(base, len) });
+        draw(Lane::over(bytes));
     }
 
     fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {

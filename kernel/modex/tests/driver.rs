@@ -1,12 +1,11 @@
 //! The driver on a recorder: what it writes, in which order, and what that leaves in the planes.
 
 use std::collections::HashMap;
-use std::ptr::NonNull;
 
 use modex::registers::*;
 use modex::{
     Bus, Counted, Destination, HEIGHT, Lane, ModeX, Offscreen, PAGE_BYTES, PAGES, PLANE_BYTES,
-    PlanarBuffer, Tally, WIDTH,
+    PlanarBuffer, STRIDE, Tally, WIDTH, Window,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -127,9 +126,7 @@ impl Bus for Recorder {
 
     fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>)) {
         let mut staging = vec![0; usize::from(len - 1) * STEP + 1];
-        let base = NonNull::from(&mut staging[..]).cast();
-        // SAFETY: the staging bytes span the lane and are reached by nothing else meanwhile.
-        draw(unsafe { Lane::new(base, len) });
+        draw(Lane::over(&mut staging));
         for pixel in 0..usize::from(len) {
             let at = usize::from(at) + pixel * STEP;
             self.log.push(Access::Store(at as u16));
@@ -493,4 +490,86 @@ fn every_write_is_counted_once_for_its_purpose() {
         setup,
         tallies(ports.count() as u64 - 4, 1, planes / 8, planes)
     );
+}
+
+/// Whatever is drawn, in whatever shape: a window shows what a whole picture has in its columns, and
+/// touches no other.
+#[test]
+fn a_window_shows_its_columns_and_nothing_else() {
+    let seed = fastrand::u64(..);
+    println!("seed {seed}");
+    let mut random = fastrand::Rng::with_seed(seed);
+    for _ in 0..300 {
+        let width = random.u16(1..=WIDTH as u16);
+        let first = random.u16(0..=WIDTH as u16 - width);
+        let to = random.u16(0..=(WIDTH as u16 - width - first % 4) / 4) * 4 + first % 4;
+        let columns = first..first + width;
+        let mut whole = Box::new(PlanarBuffer::new());
+        let mut part = Box::new(PlanarBuffer::new());
+        let mut window = Window::new(&mut *part, columns.clone(), to);
+        for shape in 0..40 {
+            let (x, y) = (random.u16(0..WIDTH as u16), random.u16(0..HEIGHT as u16));
+            let down = random.u16(1..=HEIGHT as u16 - y);
+            let right = random.u16(1..=WIDTH as u16 - x);
+            let mut next = 0u8;
+            let mut texel = || {
+                next = next.wrapping_add(1) | 1;
+                next
+            };
+            match shape % 3 {
+                0 => whole.column(x, y, down, |lane| lane.fill(&mut texel)),
+                1 => whole.row(x, y, right, &mut texel),
+                _ => whole.lane::<1>(x, y, right.div_ceil(4), |lane| lane.fill(&mut texel)),
+            }
+            next = 0;
+            let mut texel = || {
+                next = next.wrapping_add(1) | 1;
+                next
+            };
+            match shape % 3 {
+                0 => window.column(x, y, down, |lane| lane.fill(&mut texel)),
+                1 => window.row(x, y, right, &mut texel),
+                _ => window.lane::<1>(x, y, right.div_ceil(4), |lane| lane.fill(&mut texel)),
+            }
+        }
+        for y in 0..HEIGHT {
+            for x in 0..WIDTH {
+                let shown = (x + usize::from(first)).wrapping_sub(to.into());
+                let inside = columns.contains(&(shown as u16)) && shown < WIDTH;
+                let expected = if inside { whole.pixel(shown, y) } else { 0 };
+                assert_eq!(
+                    part.pixel(x, y),
+                    expected,
+                    "({x}, {y}) of {columns:?} at {to}"
+                );
+            }
+        }
+    }
+}
+
+/// Columns keep their planes, and what is not shown costs nothing.
+#[test]
+fn a_window_on_the_card_selects_and_stores_for_its_columns_alone() {
+    let mut card = ModeX::set(Counted::new(Recorder::new()), &BLACK).unwrap();
+    let mut canvas = card.begin(&[0; HEIGHT]);
+    let mut window = Window::new(&mut canvas, 108..212, 216);
+    window.select(109);
+    for x in [105, 109, 209, 213] {
+        window.lane::<STRIDE>(x, 3, 10, |lane| lane.fill(|| 5));
+    }
+    window.row(100, 20, 10, || 6);
+    let draw = card.bus().counts().draw;
+    assert_eq!((draw.map_mask, draw.stores), (1 + 2, 20 + 2));
+    let planes = &card.bus().inner().planes;
+    let line = PAGE_BYTES + 3 * STRIDE;
+    assert_eq!(
+        [planes[1][line + 217 / 4], planes[1][line + 317 / 4]],
+        [5, 5]
+    );
+}
+
+#[test]
+#[should_panic(expected = "cannot be shown from column 2 on")]
+fn a_window_that_would_change_planes_is_refused() {
+    Window::new(&mut PlanarBuffer::new(), 0..4, 2);
 }

@@ -1,5 +1,7 @@
 //! A scene made ready, and the way from a pose to polygons.
 
+mod errors;
+
 use modex::{Destination, HEIGHT, Palette};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex, Visible};

@@ -119,6 +119,12 @@ pub const KEYS: &[Key] = &[
         "info: what the pictures take",
     ),
     key(
+        "X",
+        [KeyCode::X; 2],
+        Action::Split,
+        "split: as it is, exact, and its error",
+    ),
+    key(
         "R",
         [KeyCode::R; 2],
         Action::Reset,

@@ -15,6 +15,7 @@
 
 mod keys;
 mod overlay;
+mod split;
 mod steering;
 
 use core::fmt;
@@ -24,7 +25,7 @@ use link::{
     Action, Change, Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting,
     Word,
 };
-use modex::{Bus, Counted, HEIGHT, ModeX, Offscreen, Readback, Tally, WIDTH};
+use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, Readback, Tally, WIDTH};
 use pack::{Arena, Pack};
 use scene::catalogue::{Entry, MAX_TEXELS};
 use scene::{Pose, Stage, Storage};
@@ -33,6 +34,7 @@ use texmap::{Mapper, Order, Stats};
 use keys::Keyboard;
 pub use keys::{KEYS, Key};
 use overlay::{Figures, Overlay, Writing};
+use split::Split;
 use steering::{Log, NotNoted, Notes, Scenes, State};
 
 /// The program's version, as its first line and `version` tell it.
@@ -114,6 +116,8 @@ pub struct Show<'a, B> {
     picture: Option<Picture>,
     mapper: Mapper,
     drawn: Stats,
+    /// The largest error of the last picture, if it was split.
+    most: u32,
     /// Nothing while the show is held.
     pace: Option<Pace>,
 }
@@ -145,6 +149,7 @@ impl<'a, B: Bus> Show<'a, B> {
             picture: None,
             mapper: Mapper::default(),
             drawn: Stats::default(),
+            most: 0,
             pace: Some(Pace::default()),
         }
     }
@@ -298,10 +303,11 @@ impl<'a, B: Bus> Show<'a, B> {
     fn draw(&mut self, picture: Picture, pose: &Pose, overlay: bool) {
         self.card.bus().take_counts();
         let background = self.stage.background();
-        self.drawn = match self.stage.order() {
+        let split = self.overlay.split().filter(|_| overlay);
+        (self.drawn, self.most) = match self.stage.order() {
             Order::Polygons | Order::Planes => {
                 let mut page = self.card.begin(background);
-                let drawn = self.stage.draw(pose, &mut page);
+                let drawn = paint(&mut self.stage, split, pose, &mut page);
                 if overlay {
                     self.overlay.draw(page.overlay());
                 }
@@ -309,7 +315,7 @@ impl<'a, B: Bus> Show<'a, B> {
             }
             Order::Buffer => {
                 self.offscreen.begin(background);
-                let drawn = self.stage.draw(pose, self.offscreen);
+                let drawn = paint(&mut self.stage, split, pose, self.offscreen);
                 if overlay {
                     self.overlay.draw(self.offscreen);
                 }
@@ -344,6 +350,7 @@ impl<'a, B: Bus> Show<'a, B> {
             order: self.state.order,
             paused: self.state.is_paused(),
             pixels: self.drawn.pixels,
+            most: self.most,
             map_masks: counts.draw.map_mask + counts.erase.map_mask,
         };
         self.overlay.prepare(tick, &figures)
@@ -583,6 +590,20 @@ impl<'a, B: Bus> Show<'a, B> {
             self.card.shown_page(),
             self.card.start_address()
         ));
+    }
+}
+
+/// Draws a picture, or the split view of it. What the picture took, and its largest error, if that is
+/// looked at.
+fn paint(
+    stage: &mut Stage<'_>,
+    split: Option<&Split>,
+    pose: &Pose,
+    destination: &mut impl Destination,
+) -> (Stats, u32) {
+    match split {
+        Some(split) => split.draw(stage, pose, destination),
+        None => (stage.draw(pose, destination), 0),
     }
 }
 

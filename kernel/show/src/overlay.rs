@@ -17,6 +17,7 @@ use scene::font;
 use texmap::{Mapper, Order};
 
 use crate::KEYS;
+use crate::split::{self, Split};
 
 /// Ticks between one writing of the figures and the next.
 const RENEWAL: u32 = 30;
@@ -232,6 +233,8 @@ pub(crate) struct Figures {
     pub pixels: u32,
     /// Of the last picture, its overlay aside.
     pub map_masks: u64,
+    /// Of the last picture, if it was split: the largest error, in 2^-16 texel.
+    pub most: u32,
 }
 
 /// Pictures since a tick.
@@ -249,6 +252,8 @@ pub(crate) struct Overlay<'a> {
     inks: Inks,
     help: bool,
     info: bool,
+    split: bool,
+    colours: Split,
     hint: Option<u32>,
     /// Something else is to be written than is.
     stale: bool,
@@ -265,6 +270,8 @@ impl<'a> Overlay<'a> {
             inks: Inks::of(palette),
             help: false,
             info: false,
+            split: false,
+            colours: Split::of(palette),
             hint: None,
             stale: true,
             window: Window::default(),
@@ -274,7 +281,7 @@ impl<'a> Overlay<'a> {
 
     /// Nothing any more.
     pub fn close(&mut self) {
-        (self.help, self.info, self.hint) = (false, false, None);
+        (self.help, self.info, self.split, self.hint) = (false, false, false, None);
         self.stale = true;
     }
 
@@ -286,6 +293,12 @@ impl<'a> Overlay<'a> {
     /// The palette is another one.
     pub fn set_palette(&mut self, palette: &Palette) {
         self.inks = Inks::of(palette);
+        self.colours = Split::of(palette);
+    }
+
+    /// How pictures are split, if they are.
+    pub fn split(&self) -> Option<&Split> {
+        Some(&self.colours).filter(|_| self.split)
     }
 
     /// Takes an action, if it is the overlay's.
@@ -293,6 +306,7 @@ impl<'a> Overlay<'a> {
         match action {
             Action::Help => self.help = !self.help,
             Action::Info => self.info = !self.info,
+            Action::Split => self.split = !self.split,
             Action::Hint => self.hint = Some(tick),
             _ => return,
         }
@@ -320,7 +334,7 @@ impl<'a> Overlay<'a> {
                 since: tick,
                 ..Window::default()
             };
-            self.stale |= self.info;
+            self.stale |= self.info || self.split;
         }
         self.window.pictures += 1;
         if self
@@ -335,10 +349,13 @@ impl<'a> Overlay<'a> {
             if self.help {
                 self.write_help();
             } else {
+                if self.split {
+                    self.write_labels(figures);
+                }
                 if self.info {
                     self.write_info(figures);
                 }
-                if self.hint.is_some() {
+                if self.hint.is_some() && !self.split {
                     let text = "H: help";
                     let x = (WIDTH - text.len() * ADVANCE) / 2;
                     let y = HEIGHT - MARGIN - font::HEIGHT;
@@ -346,11 +363,14 @@ impl<'a> Overlay<'a> {
                 }
             }
         }
-        self.help || self.info || self.hint.is_some()
+        self.help || self.info || self.split || self.hint.is_some()
     }
 
     /// Draws what was prepared.
     pub fn draw(&self, destination: &mut impl Destination) {
+        if let Some(split) = self.split() {
+            split.draw_frame(destination);
+        }
         self.writing.draw(&self.inks, destination);
     }
 
@@ -365,6 +385,32 @@ impl<'a> Overlay<'a> {
         }
     }
 
+    fn write_labels(&mut self, figures: &Figures) {
+        let Figures { mapper, most, .. } = figures;
+        let mut write = |ink, x, y, text: fmt::Arguments<'_>| {
+            self.writing.write(ink, x, y, text);
+        };
+        let y = HEIGHT - MARGIN - font::HEIGHT;
+        let [left, middle, right] = split::WINDOWS.map(|x| x + MARGIN);
+        write(Ink::Bright, left, y, format_args!("{mapper}"));
+        write(Ink::Bright, middle, y, format_args!("exact"));
+        let hundredths = (u64::from(*most) * 100) >> 16;
+        let (whole, part) = (hundredths / 100, hundredths % 100);
+        write(
+            Ink::Bright,
+            right,
+            y,
+            format_args!("most {whole}.{part:02} texel"),
+        );
+        let y = split::LEGEND_Y + split::LEGEND_LINES + 3;
+        for (step, text) in [(1, "1/256"), (split::TEXEL, "1"), (split::STEPS - 1, "64")] {
+            let begins = split::LEGEND_X + step * split::LEGEND_STEP;
+            // Two letters end where the last step does.
+            let x = begins - ADVANCE * usize::from(text.len() == 2);
+            write(Ink::Plain, x, y, format_args!("{text}"));
+        }
+    }
+
     fn write_info(&mut self, figures: &Figures) {
         let Figures {
             scene,
@@ -373,6 +419,7 @@ impl<'a> Overlay<'a> {
             paused,
             pixels,
             map_masks,
+            ..
         } = figures;
         let (pace, writing) = (self.pace, &mut *self.writing);
         let mut y = MARGIN;

@@ -317,7 +317,7 @@ impl<'a> State<'a> {
                 self.order = Order::ALL[next].1;
             }
             Action::Reset => *self = Self::of(self.scenes, entry),
-            Action::Help | Action::Info | Action::Hint => {}
+            Action::Help | Action::Info | Action::Split | Action::Hint => {}
         }
     }
 

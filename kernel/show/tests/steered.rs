@@ -279,3 +279,66 @@ fn an_overlay_is_counted_apart_and_goes_again() {
     let gone = (0..400).find(|_| present(&mut show).1 == NONE).unwrap();
     assert!((250..300).contains(&gone), "{gone}");
 }
+
+/// Each window has what the whole picture has there, in every order; the error of the exact mapper is
+/// the same everywhere, and no other mapper's is.
+#[test]
+fn a_split_view_shows_the_same_part_three_times() {
+    const LINES: usize = 200;
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut tick = 0;
+    let mut pixels = |show: &mut Show<'_, Vga>| {
+        tick += 1;
+        show.present(tick, &mut |_| {});
+        assert_eq!(show.bus().take_faults(), []);
+        show.bus().finish_frame();
+        show.bus().page().unwrap().pixels
+    };
+    let part = |pixels: &[u8], from: usize| -> Vec<u8> {
+        let line = |y: usize| pixels[y * 320 + from..][..104].to_vec();
+        (0..LINES).flat_map(line).collect()
+    };
+    done(&mut show, "scene tilted", 0);
+    done(&mut show, "steer pause", 0);
+    let sky = pixels(&mut show)[0];
+    done(&mut show, "mapper exact", 0);
+    let exact = part(&pixels(&mut show), 108);
+    for order in ["polygons", "planes", "buffer"] {
+        done(&mut show, &format!("order {order}"), 0);
+        for mapper in [
+            "shifts",
+            "row-multiply",
+            "row-passes",
+            "free",
+            "nearer",
+            "exact",
+        ] {
+            done(&mut show, &format!("mapper {mapper}"), 0);
+            let whole = part(&pixels(&mut show), 108);
+            done(&mut show, "steer split", 0);
+            let split = pixels(&mut show);
+            assert!(part(&split, 0) == whole, "{mapper} {order}");
+            assert!(part(&split, 108) == exact, "exact beside {mapper} {order}");
+            let mut errors = part(&split, 216);
+            errors.sort();
+            errors.dedup();
+            let same = errors
+                .iter()
+                .filter(|colour| !whole.contains(colour))
+                .count();
+            // The board leans so that other mappers are off by next to nothing, too.
+            match mapper {
+                "exact" => assert_eq!(same, 1, "{order}: {errors:?}"),
+                "shifts" | "row-multiply" => assert!(same > 4, "{mapper} {order}: {errors:?}"),
+                _ => {}
+            }
+            done(&mut show, "steer split", 0);
+            assert!(
+                part(&pixels(&mut show), 108) == whole,
+                "{mapper} {order} again"
+            );
+            assert_eq!(pixels(&mut show)[0], sky);
+        }
+    }
+}

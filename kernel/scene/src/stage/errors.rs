@@ -1,0 +1,174 @@
+//! Pictures of the errors that mappers make.
+
+use core::ops::Range;
+
+use modex::{Destination, HEIGHT};
+use texmap::coverage::Axis;
+use texmap::plane::coordinate;
+use texmap::{Job, Walk};
+
+use super::{LIGHT_LEVELS, Stage, polygons};
+use crate::Pose;
+
+impl Stage<'_> {
+    /// Draws the solid as [`Stage::draw`] does, but each pixel in the colour of its error: how far
+    /// the mapper's coordinates are from the exact quotients, either of them at most, in 2^-16 texel.
+    /// Whole columns beside `columns` may be left out. Returns the largest error in `columns`.
+    ///
+    /// In polygon order always: the error is looked at, not what it costs.
+    pub fn draw_errors(
+        &mut self,
+        pose: &Pose,
+        columns: Range<u16>,
+        colour: impl Fn(u32) -> u8,
+        destination: &mut impl Destination,
+    ) -> u32 {
+        if !self.mesh.convex {
+            self.find_visible(pose);
+        }
+        let visible = &*self.visible;
+        let mut most = 0;
+        polygons(&self.mesh, self.points, pose, |face_number, face| {
+            let Some(face) = face else { return };
+            let number = usize::from(face.texture);
+            let texture =
+                self.surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, self.texels);
+            let plane = face.plane();
+            let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
+                let c = plane.c.at(x, y);
+                let off = |found: i32, form: texmap::plane::Form, size: u16| {
+                    found.abs_diff(coordinate(form.at(x, y), c, size))
+                };
+                off(u, plane.a, texture.width()).max(off(v, plane.b, texture.height()))
+            };
+            let mut draw = |job: Job| {
+                if keeps_to_its_column(&job) && !columns.contains(&job.x) {
+                    return;
+                }
+                let mut run = Run::new();
+                job.pixels(&texture, |place, coordinates| {
+                    let error = error(place, coordinates);
+                    if columns.contains(&place.0) {
+                        most = most.max(error);
+                    }
+                    run.push(place, colour(error), destination);
+                });
+                run.draw(destination);
+            };
+            // What is outside the legal range is not drawn otherwise, either.
+            let _ = self
+                .mapper
+                .jobs(&face, &texture, |job| match self.mesh.convex {
+                    true => draw(job),
+                    false => visible.cut(face_number, &job, &mut draw),
+                });
+        });
+        most
+    }
+}
+
+fn keeps_to_its_column(job: &Job) -> bool {
+    job.axis == Axis::Down && !matches!(job.walk, Walk::Free(_))
+}
+
+/// Pixels below each other that are not drawn yet.
+struct Run {
+    place: (u16, u16),
+    colours: [u8; HEIGHT],
+    len: u16,
+}
+
+impl Run {
+    fn new() -> Self {
+        Self {
+            place: (0, 0),
+            colours: [0; HEIGHT],
+            len: 0,
+        }
+    }
+
+    /// Adds a pixel; what it does not continue is drawn first.
+    fn push(&mut self, place: (u16, u16), colour: u8, destination: &mut impl Destination) {
+        if place != (self.place.0, self.place.1 + self.len) {
+            self.draw(destination);
+            self.place = place;
+        }
+        self.colours[usize::from(self.len)] = colour;
+        self.len += 1;
+    }
+
+    /// Draws what there is.
+    fn draw(&mut self, destination: &mut impl Destination) {
+        let (x, y) = self.place;
+        if self.len > 0 {
+            let mut colours = self.colours.iter().copied();
+            destination.column(x, y, self.len, |column| {
+                column.fill(|| colours.next().unwrap_or_default());
+            });
+        }
+        self.len = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use crate::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+    use crate::{Pose, Stage, Storage};
+    use modex::{PlanarBuffer, WIDTH};
+    use std::boxed::Box;
+    use texmap::Mapper;
+
+    /// Calls `check` with a scene's entry and a stage of it.
+    fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut Stage<'_>)) {
+        let entry = CATALOGUE.iter().find(|entry| entry.name == name).unwrap();
+        let mut texels = Box::new([0; MAX_TEXELS]);
+        let textures = [entry.paint(&mut texels)];
+        let mut storage = Box::new(Storage::new());
+        check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
+    }
+
+    /// The largest error of a picture. Every pixel of it has one, and no other pixel has.
+    fn largest(stage: &mut Stage<'_>, pose: &Pose) -> u32 {
+        let mut drawn = Box::new(PlanarBuffer::new());
+        let stats = stage.draw(pose, &mut *drawn);
+        let mut page = Box::new(PlanarBuffer::new());
+        let found = stage.draw_errors(pose, 0..WIDTH as u16, |_| 1, &mut *page);
+        let with = page.planes.as_flattened().iter().filter(|&&byte| byte == 1);
+        assert_eq!(with.count(), stats.pixels as usize);
+        // Of a part the largest is no larger.
+        assert!(stage.draw_errors(pose, 108..212, |_| 0, &mut *page) <= found);
+        found
+    }
+
+    /// As measured by other means: `shifts` is off by some fifty texels on the tilted board, `within-T`
+    /// by T at most, the exact mapper nowhere.
+    #[test]
+    fn errors_are_those_of_the_mapper() {
+        staged("tilted", |entry, stage| {
+            for (name, least, most) in [
+                ("shifts", 48.0, 75.0),
+                ("row-steps", 30.0, 50.0),
+                ("within-1/4", 0.2, 0.25),
+                ("tiles-16", 0.7, 1.0),
+                ("free", 0.0, 0.01),
+                ("exact", 0.0, 0.0),
+            ] {
+                stage.set_mapper(Mapper::parse(name).unwrap());
+                let texels = f64::from(largest(stage, &entry.pose(40))) / 65_536.0;
+                assert!((least..=most).contains(&texels), "{name}: {texels}");
+            }
+        });
+    }
+
+    /// Of a solid that hides parts of itself those that are seen.
+    #[test]
+    fn hidden_surfaces_have_no_error() {
+        staged("knot", |entry, stage| {
+            for name in ["shifts", "row-steps", "free", "exact"] {
+                stage.set_mapper(Mapper::parse(name).unwrap());
+                assert_eq!(largest(stage, &entry.pose(40)) == 0, name == "exact");
+            }
+        });
+    }
+}
