@@ -35,6 +35,12 @@ const LAMP: [f64; 3] = [255.0, 253.0, 244.0];
 /// The way to the lamp's colour that the brightest highlight goes.
 const GLINT: f64 = 0.4;
 
+/// The part of an error that is made good for. With all of it a small one would add up until one
+/// texel of the four has another hue altogether, which is seen more than the error.
+const MADE_GOOD: f32 = 0.6;
+/// How much more the most frequent material weighs than one that hardly occurs.
+const MOST_WEIGHT: f64 = 32.0;
+
 /// What a texture is reduced to.
 #[derive(Clone, Debug)]
 pub struct Reduced {
@@ -56,17 +62,24 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
     let of_materials = srgb8_to_oklab(&materials);
     let nearest_material = Nearest::new(of_materials);
     let colours = srgb8_to_oklab(&colours);
-    let texels = colours.iter().enumerate().map(|(i, colour)| {
-        let variant = PATTERN[i / columns % 2][i % columns % 2];
-        (nearest_material.to(*colour) * VARIANTS + variant) as u8
-    });
+    let mut used = vec![0; materials.len()];
+    let texels: Vec<_> = colours
+        .iter()
+        .enumerate()
+        .map(|(i, colour)| {
+            let material = nearest_material.to(*colour);
+            used[material] += 1;
+            let variant = PATTERN[i / columns % 2][i % columns % 2];
+            (material * VARIANTS + variant) as u8
+        })
+        .collect();
 
     let lit: Vec<Vec<Srgb<u8>>> = (0..LIGHT_LEVELS)
         .map(|level| materials.iter().map(|&colour| lit(colour, level)).collect())
         .collect();
     let free = scene::MATERIALS;
     let mut palette = *Colours::BUILT_IN.palette;
-    let own = quantized(&lit.concat(), free.len());
+    let own = quantized(&weighted(&lit, &used), free.len());
     for (entry, colour) in palette[free].iter_mut().zip(own) {
         *entry = narrow(colour);
     }
@@ -81,7 +94,7 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
             let mut wanted = target;
             let mut chosen = [0; VARIANTS].map(|_: u8| {
                 let entry = nearest_entry.to(wanted);
-                wanted += target - nearest_entry.colours[entry];
+                wanted += (target - nearest_entry.colours[entry]) * MADE_GOOD;
                 entry
             });
             let lightness = |&entry: &usize| nearest_entry.colours[entry].l;
@@ -92,10 +105,24 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
         }
     }
     Reduced {
-        texels: texels.collect(),
+        texels,
         palette,
         light,
     }
+}
+
+/// The lit colours, those more often of which there is more, by the square root: a large field is
+/// smooth then, and an eye in it still has its colour.
+fn weighted(lit: &[Vec<Srgb<u8>>], used: &[u32]) -> Vec<Srgb<u8>> {
+    let most = used.iter().copied().max().unwrap_or(1);
+    let times = |used: u32| 1 + (MOST_WEIGHT * (f64::from(used) / f64::from(most)).sqrt()) as usize;
+    let mut weighted = Vec::new();
+    for level in lit {
+        for (&colour, &used) in level.iter().zip(used) {
+            weighted.extend(std::iter::repeat_n(colour, times(used)));
+        }
+    }
+    weighted
 }
 
 /// At most `count` colours for all of these.
