@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use crystal_ball::card::{Card, Emulated};
 use crystal_ball::diff;
 use crystal_ball::frames::Frames;
@@ -147,6 +147,13 @@ enum Subcommands {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    // clap does not know it of options that stand on different sides of a subcommand.
+    if cli.model.texture.is_some() && cli.model.model.is_none() {
+        let kind = clap::error::ErrorKind::MissingRequiredArgument;
+        Cli::command()
+            .error(kind, "--texture is for a --model")
+            .exit();
+    }
     child::catch_interrupts();
     match run(cli) {
         Ok(code) => code,
@@ -230,10 +237,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             machine.leave()?;
         }
         Some(Subcommands::Emulate(frames)) => {
-            let model = files.load()?;
-            if let Some(model) = &model {
-                say(model);
-            }
+            let model = load(&files)?;
             let pack = model.as_ref().map(Model::pack);
             let mut memory = Box::new(Memory::new());
             let mut card = Emulated::with(&mut memory, pack.as_ref())?;
@@ -281,7 +285,9 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             trade_options
                 .mappers
                 .extend(mapper.map(|mapper| mapper.to_string()));
-            let page = trade::run(&trade_options, options)?;
+            let model = load(&files)?;
+            let pack = model.as_ref().map(Model::pack);
+            let page = trade::run(&trade_options, options, pack.as_ref())?;
             say("what was found, as a page with the tables and plots beside it:");
             tell_path(&page)?;
         }
@@ -305,13 +311,20 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Makes the user's model, if there is one, the ramdisk of the image; tells what it is and what it
-/// costs. Returns its pack's checksum.
+/// Makes the user's model, if there is one, and tells what it is.
+fn load(files: &Files) -> anyhow::Result<Option<Model>> {
+    let model = files.load()?;
+    if let Some(model) = &model {
+        say(model);
+    }
+    Ok(model)
+}
+
+/// The same, to be the ramdisk of the image; tells what that costs. Returns its pack's checksum.
 fn load_to_boot(files: &Files, options: &mut Options) -> anyhow::Result<Option<u32>> {
-    let Some(model) = files.load()? else {
+    let Some(model) = load(files)? else {
         return Ok(None);
     };
-    say(&model);
     say(format_args!(
         "with its {} KiB the boot takes about {:.1} s longer",
         model.bytes.len().div_ceil(1024),

@@ -21,6 +21,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::builder::PossibleValuesParser;
+use pack::{Arena, Pack};
+use scene::catalogue::Entry;
 use texmap::loops::Loop;
 use texmap::{Mapper, Order};
 
@@ -43,6 +45,7 @@ use accuracy::Jobs;
 use cost::{Effort, ROUNDS, SWEEPS, Swept};
 use page::{Gallery, Page};
 use plot::{Line, Point};
+use subject::Subject;
 use table::{Row, Table};
 
 /// The random scene's seed, unless another is asked for: the same polygons every time.
@@ -114,11 +117,18 @@ pub fn check_build() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Measures and writes; returns the page's path.
+/// Measures and writes; returns the page's path. With a model it is measured beside the scenes that
+/// were asked for, and alone if none was.
 ///
 /// # Errors
 /// When the measuring kernel can't be asked, or a file can't be written.
-pub fn run(options: &Options, setup: setup::Options) -> anyhow::Result<PathBuf> {
+pub fn run(
+    options: &Options,
+    setup: setup::Options,
+    model: Option<&Pack<'_>>,
+) -> anyhow::Result<PathBuf> {
+    let mut arena = Box::new(Arena::new());
+    let model = model.map(|pack| pack.entry(&mut arena));
     let out = match &options.out {
         Some(out) => out.clone(),
         None => crate::setup::folder().join("trade"),
@@ -129,8 +139,10 @@ pub fn run(options: &Options, setup: setup::Options) -> anyhow::Result<PathBuf> 
         .filter(|named| chosen(&options.mappers, named.0))
         .map(|named| named.1)
         .collect();
+    let model_alone = model.is_some() && options.scenes.is_empty();
     let scenes: Vec<_> = subject::names()
-        .filter(|name| chosen(&options.scenes, name))
+        .filter(|name| !model_alone && chosen(&options.scenes, name))
+        .chain(model.map(|entry| entry.name))
         .collect();
     let effort = match options.quick {
         true => Effort::QUICK,
@@ -151,7 +163,7 @@ pub fn run(options: &Options, setup: setup::Options) -> anyhow::Result<PathBuf> 
     };
     let found = Found {
         kernel: measured,
-        ..measure(&scenes, &mappers, options.seed, effort)
+        ..measure(&scenes, model.as_ref(), &mappers, options.seed, effort)
     };
     let about = about(options, &mappers);
     found.write(&out, &about)?;
@@ -196,14 +208,20 @@ struct Found {
     kernel: Option<Measured>,
 }
 
-fn measure(scenes: &[&str], mappers: &[Mapper], seed: u64, effort: Effort) -> Found {
+fn measure(
+    scenes: &[&str],
+    model: Option<&Entry<'_>>,
+    mappers: &[Mapper],
+    seed: u64,
+    effort: Effort,
+) -> Found {
     let mut jobs = Box::new(Jobs::new());
     let mut tables = Vec::new();
     let mut galleries = Vec::new();
     let mut column = None;
     let mut step = Step::counting("measuring scenes", scenes.len() as u64);
     for (done, name) in (1..).zip(scenes) {
-        subject::with(name, seed, |subject| {
+        let look = |subject: &Subject<'_>| {
             let number = TIMED.min(subject.pictures.len() - 1);
             let mut costs = cost::measure(subject, number, mappers, effort).into_iter();
             let rows = mappers.iter().map(|&mapper| Row {
@@ -212,7 +230,7 @@ fn measure(scenes: &[&str], mappers: &[Mapper], seed: u64, effort: Effort) -> Fo
                 costs: costs.by_ref().take(cost::ORDERS.len()).collect(),
             });
             let rows = rows.collect();
-            if SHOWN.contains(name) || scenes.len() == 1 {
+            if SHOWN.contains(name) || *name == Entry::LOADED || scenes.len() == 1 {
                 galleries.push(Gallery::new(subject, mappers, &mut jobs));
             }
             if *name == COLUMN {
@@ -223,7 +241,11 @@ fn measure(scenes: &[&str], mappers: &[Mapper], seed: u64, effort: Effort) -> Fo
                 about: subject.about.clone(),
                 rows,
             });
-        });
+        };
+        match model.filter(|entry| entry.name == *name) {
+            Some(entry) => subject::with_entry(entry, look),
+            None => subject::with(name, seed, look),
+        }
         step.at(done);
     }
     drop(step);
@@ -249,7 +271,7 @@ fn measure(scenes: &[&str], mappers: &[Mapper], seed: u64, effort: Effort) -> Fo
 }
 
 /// The errors down the longest column of a subject's first picture.
-fn along_column(subject: &subject::Subject<'_>) -> Option<(u16, Vec<Line>)> {
+fn along_column(subject: &Subject<'_>) -> Option<(u16, Vec<Line>)> {
     let faces = &subject.pictures[0];
     let mut pixels = BTreeMap::new();
     let errors = |mapper, sink: &mut dyn FnMut((u16, u16), f64)| {

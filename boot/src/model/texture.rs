@@ -7,9 +7,7 @@
 //! corner of its picture has that corner in full sharpness; one that repeats it four times has a
 //! quarter of it. It is never scaled up.
 
-use std::fs::File;
-use std::io::BufReader;
-use std::path::Path;
+use std::io::{BufRead, Seek};
 
 use anyhow::{Context, ensure};
 use image::codecs::png::PngDecoder;
@@ -32,11 +30,10 @@ const TEXEL: f64 = 65_536.0;
 /// Reads a PNG.
 ///
 /// # Errors
-/// A file that can't be read, is no whole PNG, or is larger than [`MAX_PIXELS`].
-pub fn read(path: &Path) -> anyhow::Result<RgbImage> {
-    let file = BufReader::new(File::open(path).context("it cannot be read")?);
+/// What is no whole PNG, or is larger than [`MAX_PIXELS`].
+pub fn read(from: impl BufRead + Seek) -> anyhow::Result<RgbImage> {
     // The size first: decoding takes the memory that the header asks for.
-    let decoder = PngDecoder::new(file).context("it is no PNG")?;
+    let decoder = PngDecoder::new(from).context("it is no PNG")?;
     let (width, height) = decoder.dimensions();
     ensure!(
         width <= MAX_PIXELS && height <= MAX_PIXELS,

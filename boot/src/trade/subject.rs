@@ -113,8 +113,12 @@ pub fn with<T>(name: &str, seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T
         return with_random(seed, look);
     }
     let entry = Entry::parse(name).expect("the scene was looked up before");
-    let poses = TICKS.map(|tick| entry.pose(tick));
-    with_poses(entry, &poses, look)
+    with_entry(entry, look)
+}
+
+/// Makes a subject of a scene, and lends it.
+pub fn with_entry<T>(entry: &Entry<'_>, look: impl FnOnce(&Subject<'_>) -> T) -> T {
+    with_poses(entry, &TICKS.map(|tick| entry.pose(tick)), look)
 }
 
 /// Makes a subject of a scene at some poses, and lends it.
