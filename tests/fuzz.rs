@@ -125,6 +125,7 @@ fn packed(text: &[u8], picture: (u32, u32)) -> anyhow::Result<Vec<u8>> {
             vertices: &solid.vertices,
             corners: &solid.corners,
             faces: &solid.faces,
+            convex: false,
         },
         texture: Texture::new(&texels, width, height)?,
         colours: Colours::BUILT_IN,

@@ -500,7 +500,7 @@ mod tests {
         let mappers = mappers.map(|name| Mapper::parse(name).unwrap());
         let effort = Effort { slice: 1 };
         fs::create_dir(out.path().join("pictures")).unwrap();
-        let found = measure(&["tilted", "wall"], &mappers, 1, effort);
+        let found = measure(&["tilted", "wall"], None, &mappers, 1, effort);
         found.write(out.path(), &["about".into()]).unwrap();
         let read = |name: &str| fs::read_to_string(out.path().join(name)).unwrap();
         let csv = read("trade.csv");

@@ -11,6 +11,8 @@
 //! each level the entries of the four are chosen one after the other, each to make good for what the
 //! ones before it were off. Together they have the colour that was meant.
 
+use std::collections::BTreeSet;
+
 use image::Rgb;
 use modex::{Palette, Rgb6};
 use quantette::color_space::srgb8_to_oklab;
@@ -125,8 +127,13 @@ fn weighted(lit: &[Vec<Srgb<u8>>], used: &[u32]) -> Vec<Srgb<u8>> {
     weighted
 }
 
-/// At most `count` colours for all of these.
+/// At most `count` colours for all of these: they themselves, if there are no more.
 fn quantized(colours: &[Srgb<u8>], count: usize) -> Vec<Srgb<u8>> {
+    let parts = colours.iter().map(|&colour| <[u8; 3]>::from(colour));
+    let different: BTreeSet<_> = parts.collect();
+    if different.len() <= count {
+        return different.into_iter().map(Srgb::from).collect();
+    }
     let size = count.try_into().expect("a palette has at most 256 colours");
     let pipeline = Pipeline::new()
         .palette_size(size)
@@ -175,5 +182,83 @@ impl Nearest {
         let distances = self.colours.iter().map(distance).enumerate();
         let nearest = distances.min_by(|(_, a), (_, b)| a.total_cmp(b));
         nearest.map_or(0, |(i, _)| i)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A texture of 64 x 64 with a sweep of hues, a flat field and one odd texel.
+    fn texture() -> Vec<Rgb<u8>> {
+        let mut texture: Vec<_> = (0..64 * 64u32)
+            .map(|i| match (i % 64, i / 64) {
+                (x, y @ 0..32) => Rgb([(x * 4) as u8, (y * 8) as u8, 255 - (x * 4) as u8]),
+                _ => Rgb([230, 200, 20]),
+            })
+            .collect();
+        texture[64 * 50 + 30] = Rgb([0, 0, 0]);
+        texture
+    }
+
+    #[test]
+    fn four_texels_together_have_their_colour_in_full_light() {
+        let texture = texture();
+        let reduced = reduce(&texture, 64);
+        let shown = |x: usize, y: usize| {
+            let entry = reduced.light[FULL_LIGHT][usize::from(reduced.texels[64 * y + x])];
+            reduced.palette[usize::from(entry)].map(|part| i32::from(widen(part)))
+        };
+        let (mut worst, mut sum) = (0, 0);
+        for y in (0..64).step_by(2) {
+            for x in (0..64).step_by(2) {
+                let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
+                for k in 0..3 {
+                    let meant: i32 = four
+                        .map(|(x, y)| i32::from(texture[64 * y + x].0[k]))
+                        .iter()
+                        .sum();
+                    let is: i32 = four.map(|(x, y)| shown(x, y)[k]).iter().sum();
+                    let off = (meant - is).abs() / 4;
+                    (worst, sum) = (worst.max(off), sum + off);
+                }
+            }
+        }
+        // As seen by the eye; a channel alone may be off by more.
+        let mean = sum / (3 * 32 * 32);
+        assert!(mean < 12 && worst < 96, "{mean}, at most {worst}, of 255");
+        let black = shown(30, 50);
+        assert!(black.iter().all(|&part| part < 40), "{black:?}");
+    }
+
+    #[test]
+    fn light_brightens_and_what_is_not_the_models_stays() {
+        let reduced = reduce(&texture(), 64);
+        let built_in = Colours::BUILT_IN.palette;
+        for entry in (0..256).filter(|entry| !scene::MATERIALS.contains(entry)) {
+            assert_eq!(reduced.palette[entry], built_in[entry]);
+        }
+        let brightness = |level: usize| -> u32 {
+            let entries = reduced
+                .texels
+                .iter()
+                .map(|&texel| reduced.light[level][usize::from(texel)]);
+            let parts = entries.map(|entry| reduced.palette[usize::from(entry)].map(u32::from));
+            parts.map(|[r, g, b]| 3 * r + 6 * g + b).sum()
+        };
+        for level in 1..LIGHT_LEVELS {
+            assert!(brightness(level) > brightness(level - 1), "{level}");
+        }
+    }
+
+    #[test]
+    fn one_colour_is_a_texture_too_and_the_same_comes_out_again() {
+        let plain = [Rgb([10, 200, 30])];
+        let reduced = reduce(&plain, 1);
+        let entry = reduced.light[FULL_LIGHT][usize::from(reduced.texels[0])];
+        assert_eq!(reduced.palette[usize::from(entry)], [2, 49, 7]);
+        let (once, again) = (reduce(&texture(), 64), reduce(&texture(), 64));
+        assert_eq!((once.texels, once.palette), (again.texels, again.palette));
+        assert_eq!(once.light, again.light);
     }
 }

@@ -389,3 +389,214 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 fn length(a: [f64; 3]) -> f64 {
     dot(a, a).sqrt()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{obj, solid};
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
+                          vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5 1\n";
+
+    fn made(text: &str) -> Solid {
+        let obj = obj::parse(text.as_bytes()).unwrap();
+        let (solid, layout) = solid(&obj, (256, 256)).unwrap();
+        assert_eq!(layout.size(), (256, 256));
+        solid
+    }
+
+    /// Each face's corners.
+    fn faces(solid: &Solid) -> Vec<Vec<Corner>> {
+        let mut rest = &solid.corners[..];
+        let faces = solid.faces.iter().map(|face| {
+            let (corners, after) = rest.split_at(face.corners.into());
+            rest = after;
+            corners.to_vec()
+        });
+        let faces = faces.collect();
+        assert!(rest.is_empty());
+        faces
+    }
+
+    /// Twice a face's area along its normal, in units; below zero when it is inside out.
+    fn area(solid: &Solid, face: &Face, corners: &[Corner]) -> f64 {
+        let at = |i: usize| solid.vertices[usize::from(corners[i].vertex)].map(f64::from);
+        let sides =
+            (1..corners.len() - 1).map(|i| cross(minus(at(i + 1), at(0)), minus(at(i), at(0))));
+        let normal = face.normal.map(|k| f64::from(k) / 16_384.0);
+        sides.map(|side| dot(side, normal)).sum::<f64>() / (GRID * GRID)
+    }
+
+    #[test]
+    fn a_flat_convex_face_of_one_texture_plane_stays_whole() {
+        let solid = made(&format!("{SQUARE}f 1/1 2/2 3/3 4/4\n"));
+        assert_eq!(solid.tally, Tally::default());
+        let [face] = &faces(&solid)[..] else {
+            panic!("{solid:?}");
+        };
+        // Looking at it from the front, y is up in the file: clockwise from some corner.
+        let side = 256 << 16;
+        let r = (RADIUS * GRID / 2f64.sqrt()).round() as i32;
+        let clockwise = [
+            [r, r, side, side],
+            [-r, r, 0, side],
+            [-r, -r, 0, 0],
+            [r, -r, side, 0],
+        ];
+        let found: Vec<_> = face
+            .iter()
+            .map(|corner| {
+                let [x, y, z] = solid.vertices[usize::from(corner.vertex)];
+                assert_eq!(z, 0);
+                [x, y, corner.u, corner.v]
+            })
+            .collect();
+        let first = clockwise
+            .iter()
+            .position(|corner| *corner == found[0])
+            .unwrap();
+        assert!(
+            (0..4).all(|i| found[i] == clockwise[(first + i) % 4]),
+            "{found:?}"
+        );
+        // It looks at who sits before the screen.
+        assert_eq!(solid.faces[0].normal, [0, 0, -16_384]);
+    }
+
+    #[test]
+    fn any_other_face_is_cut_and_nothing_of_it_is_lost() {
+        let bent = SQUARE.replace("v 1 1 0", "v 1 1 .2");
+        let rim = |n: usize| {
+            let radius = |i| if n == 24 && i % 2 == 1 { 0.4 } else { 1.0 };
+            let (mut text, mut face) = (String::new(), String::from("f"));
+            for i in 0..n {
+                let (s, c) = (i as f64 / n as f64 * std::f64::consts::TAU).sin_cos();
+                text += &format!("v {} {} 0\n", radius(i) * c, radius(i) * s);
+                face += &format!(" {}", i + 1);
+            }
+            format!("{text}{face}\n")
+        };
+        let sized = |area: f64| area * RADIUS * RADIUS;
+        for (text, pieces, expected) in [
+            (format!("{SQUARE}f 1/1 2/2 3/3 4/5\n"), 2, sized(4.0)),
+            (format!("{bent}f 1/1 2/2 3/3 4/4\n"), 2, 0.0),
+            // A corner that bends inwards.
+            (
+                "v 0 0 0\nv 2 0 0\nv .5 .5 0\nv 0 2 0\nf 1 2 3 4\n".into(),
+                2,
+                0.0,
+            ),
+            (rim(11), 1, 0.0),
+            (
+                rim(10),
+                1,
+                sized(10.0 * (std::f64::consts::TAU / 10.0).sin()),
+            ),
+            (
+                rim(12),
+                10,
+                sized(12.0 * (std::f64::consts::TAU / 12.0).sin()),
+            ),
+            // A star of twelve points.
+            (
+                rim(24),
+                22,
+                sized(24.0 * 0.4 * (std::f64::consts::TAU / 24.0).sin()),
+            ),
+        ] {
+            let obj = obj::parse(text.as_bytes()).unwrap();
+            let (solid, _) = solid(&obj, (256, 256)).unwrap();
+            assert_eq!(solid.faces.len(), pieces, "{text}");
+            assert_eq!(solid.tally.cut, usize::from(pieces > 1));
+            let areas = solid.faces.iter().zip(faces(&solid));
+            let areas: Vec<_> = areas
+                .map(|(face, corners)| area(&solid, face, &corners))
+                .collect();
+            assert!(areas.iter().all(|&area| area > 0.0), "{text}: {areas:?}");
+            let sum: f64 = areas.iter().sum();
+            assert!(
+                expected == 0.0 || (sum - expected).abs() < 1e-3,
+                "{sum}, {expected}"
+            );
+            // No cut shows in the light.
+            assert!(
+                solid
+                    .faces
+                    .iter()
+                    .all(|face| face.normal == solid.faces[0].normal)
+            );
+        }
+    }
+
+    #[test]
+    fn the_texture_plane_is_not_made_of_corners_on_a_line() {
+        // The middle of the lower side is a corner as well: the renderer would take the three of it.
+        let text = format!("{SQUARE}v .5 0 0\nvt .5 0\nf 1/1 5/6 2/2 3/3 4/4\n");
+        let solid = made(&text);
+        let [face] = &faces(&solid)[..] else {
+            panic!("{solid:?}");
+        };
+        let three = [0, 5 / 3, 10 / 3].map(|i: usize| face[i]);
+        assert!(area(&solid, &solid.faces[0], &three) > 0.5);
+    }
+
+    #[test]
+    fn faces_without_an_area_are_dropped_and_points_in_one_place_are_one() {
+        let text = format!(
+            "{SQUARE}v 1 1 0.0000001\no two\nf 1/1 2/2 5/3 4/4\n\
+             f 1 1 2\nf 1 2\nf 3 5 1\nf\nf 1 2 3 2\nf 1 1 2 2 3 5\n"
+        );
+        let solid = made(&text);
+        assert_eq!(solid.vertices.len(), 4);
+        assert_eq!(solid.tally.degenerate, 5);
+        assert_eq!(solid.faces.len(), 2);
+        assert_eq!(faces(&solid)[1].len(), 3);
+    }
+
+    #[test]
+    fn made_up_coordinates_put_the_texture_on_each_side_of_a_box_the_right_way_round() {
+        let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+                    f 5 6 7 8\nf 2 1 4 3\nf 6 2 3 7\nf 1 5 8 4\nf 8 7 3 4\nf 1 2 6 5\n";
+        let obj = obj::parse(text.as_bytes()).unwrap();
+        let (solid, layout) = solid(&obj, (256, 256)).unwrap();
+        assert_eq!((solid.tally.projected, solid.faces.len()), (6, 6));
+        // The cube's sides are 1.15 of the 2 that its ball is wide.
+        assert_eq!(layout.size(), (148, 148));
+        for (face, corners) in solid.faces.iter().zip(faces(&solid)) {
+            assert!(area(&solid, face, &corners) > 0.0);
+            // Clockwise on the screen is clockwise in the texture: nothing is mirrored.
+            let [a, b, c] = [0, 1, 2].map(|i: usize| [corners[i].u, corners[i].v].map(f64::from));
+            let turn = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+            assert!(turn > 0.0, "{corners:?}");
+        }
+    }
+
+    #[test]
+    fn a_model_fits_its_ball_wherever_it_was_and_however_large() {
+        for (scale, shift) in [
+            (1.0, 0.0),
+            (1e-6, 1.0),
+            (1e20, 0.0),
+            (1e3, -1e6),
+            (1e-100, 0.0),
+        ] {
+            let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+            let vertex = |(x, y)| format!("v {:e} {:e} 3\n", x * scale + shift, y * scale + shift);
+            let text = square.map(vertex).concat() + "f 1 2 3 4\n";
+            let solid = made_small(&text);
+            let far = |vertex: &Vec3| length(vertex.map(f64::from)) / GRID;
+            for vertex in &solid.vertices {
+                assert!(
+                    (far(vertex) - RADIUS).abs() < 1e-4,
+                    "{scale} {shift}: {vertex:?}"
+                );
+            }
+        }
+    }
+
+    fn made_small(text: &str) -> Solid {
+        solid(&obj::parse(text.as_bytes()).unwrap(), (256, 256))
+            .unwrap()
+            .0
+    }
+}

@@ -184,3 +184,99 @@ impl Layout {
         self.cut(|i, j| *picture.get_pixel(i, j))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::mesh::Polygons;
+    use crate::model::obj;
+
+    /// The layout of triangles with these coordinates, and where their corners are in texels.
+    fn laid_out(triangles: &[[[f64; 2]; 3]], picture: (u32, u32)) -> (Layout, Vec<[f64; 2]>) {
+        let mut text = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
+        for [u, v] in triangles.as_flattened() {
+            text += &format!("vt {u} {v}\n");
+        }
+        for i in 0..triangles.len() {
+            // Against the clock, so that they come back in their order.
+            let [a, b, c] = [1, 2, 3].map(|k| 3 * i + k);
+            text += &format!("f 3/{c} 2/{b} 1/{a}\n");
+        }
+        let polygons = Polygons::new(&obj::parse(text.as_bytes()).unwrap()).unwrap();
+        let layout = Layout::new(&polygons.polygons, picture).unwrap();
+        let places = polygons
+            .polygons
+            .iter()
+            .flat_map(|polygon| layout.texels(polygon));
+        let places = places.map(|place| place.map(|k| f64::from(k) / TEXEL));
+        (layout, places.collect())
+    }
+
+    const WHOLE: [[f64; 2]; 3] = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]];
+
+    #[test]
+    fn a_small_picture_stays_as_it_is_and_a_large_one_is_scaled_to_fit() {
+        for (picture, size) in [
+            ((256, 256), (256, 256)),
+            ((1, 7), (1, 7)),
+            ((512, 100), (256, 100)),
+            ((300, 8192), (256, 256)),
+        ] {
+            let (layout, places) = laid_out(&[WHOLE], picture);
+            assert_eq!(layout.size(), size);
+            assert_eq!(layout.scaled(), (size.0.into(), size.1.into()));
+            let (w, h) = (f64::from(size.0), f64::from(size.1));
+            assert_eq!(places, [[0.0, 0.0], [w, 0.0], [0.0, h]]);
+        }
+    }
+
+    #[test]
+    fn only_what_is_used_is_cut_and_in_full_sharpness() {
+        let corner = [[0.5, 0.25], [0.75, 0.25], [0.5, 0.0]];
+        let (layout, places) = laid_out(&[corner], (512, 512));
+        assert_eq!((layout.size(), layout.scaled()), ((128, 128), (512, 512)));
+        assert_eq!(places, [[0.0, 0.0], [128.0, 0.0], [0.0, 128.0]]);
+        let pixels = layout.cut(|i, j| (i, j));
+        assert_eq!((pixels[0], pixels[128 * 128 - 1]), ((256, 384), (383, 511)));
+    }
+
+    #[test]
+    fn what_repeats_is_repeated_and_each_face_is_moved_to_the_first() {
+        let wide = [[-3.0, 8.0], [-1.0, 8.0], [-3.0, 7.0]];
+        let (layout, places) = laid_out(&[wide, WHOLE], (256, 256));
+        assert_eq!((layout.size(), layout.scaled()), ((256, 256), (128, 256)));
+        assert_eq!(places[..3], [[0.0, 0.0], [256.0, 0.0], [0.0, 256.0]]);
+        assert_eq!(places[3..], [[0.0, 0.0], [128.0, 0.0], [0.0, 256.0]]);
+        let row = layout.cut(|i, _| i);
+        assert_eq!((row[127], row[128], row[255]), (127, 0, 127));
+    }
+
+    #[test]
+    fn a_hair_beyond_the_border_is_the_border() {
+        let hair = [[-0.0005, 1.0004], [1.0006, 1.0], [0.0, -0.001]];
+        let (layout, places) = laid_out(&[hair], (256, 256));
+        assert_eq!(layout.size(), (256, 256));
+        assert_eq!(places[1][0], 256.0);
+        assert_eq!(places[0], [0.0, 0.0]);
+    }
+
+    #[test]
+    fn every_window_fits_whatever_the_coordinates() {
+        let mut random = fastrand::Rng::with_seed(5);
+        for case in 0..20_000 {
+            let low = random.f64();
+            let high = low + random.f64().powi(8) * MAX_REPEATS;
+            let pixels = random.u32(1..=MAX_PIXELS);
+            let window = Window::around(low, high, pixels);
+            assert!(
+                window.picture <= pixels && (1..=256).contains(&window.texels),
+                "{case}"
+            );
+            for (place, border) in [(low, 0.0), (high, f64::from(window.texels))] {
+                let texel = place * f64::from(window.picture) - window.first as f64;
+                assert!((texel - border).abs() <= 1.0, "{case}: {window:?}");
+            }
+            assert!(window.pixel(u32::from(window.texels) - 1) < window.picture);
+        }
+    }
+}
