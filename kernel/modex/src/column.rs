@@ -121,8 +121,11 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
     ///
     /// # Panics
     /// If there are not so many.
+    #[inline]
     pub fn split(self, pixels: u16) -> (Self, Self) {
-        assert!(pixels <= self.len, "{pixels} of {} pixels", self.len);
+        if pixels > self.len {
+            missing(pixels, self.len);
+        }
         let Self { base, len, lent } = self;
         // The last pixel may be the last byte of what is lent: no pointer goes past it.
         let after = match pixels < len {
@@ -144,6 +147,23 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         (first, second)
     }
 
+    /// Lanes of `pixels` pixels each, from the first pixel on. Those at the end that do not fill one
+    /// are in none.
+    ///
+    /// # Panics
+    /// If `pixels` is 0.
+    #[inline]
+    pub fn chunks(self, pixels: u16) -> impl Iterator<Item = Self> {
+        let Self { base, len, lent } = self;
+        (0..usize::from(len / pixels)).map(move |i| {
+            // SAFETY: this many lanes fit in the length, so by the contract of `new` the address
+            // is inside, and so are the `pixels` from there on, which are in no other lane.
+            let base = unsafe { base.add(i * usize::from(pixels) * STEP) };
+            let len = pixels;
+            Self { base, len, lent }
+        })
+    }
+
     /// Writes every pixel in order; `texel` is called once for each.
     #[inline(always)]
     pub fn fill(self, mut texel: impl FnMut() -> u8) {
@@ -155,4 +175,10 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
             unsafe { at.write_volatile(value) };
         }
     }
+}
+
+/// By itself, so that a lane which has its pixels has nothing to do with the words.
+#[cold]
+fn missing(pixels: u16, len: u16) -> ! {
+    panic!("{pixels} of {len} pixels")
 }

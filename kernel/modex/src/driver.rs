@@ -50,22 +50,25 @@ impl fmt::Display for Readback {
     }
 }
 
-/// What a page was drawn on since it last held the bare background: for each group of 32
-/// pixel columns the lines `top..bottom`.
+/// What a page was drawn on since it last held the bare background: in each group of 32 pixel
+/// columns the lines from a top to a bottom. Both only ever grow, and from zero: a lane is added
+/// without asking whether its group had any.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn {
-    top: [u16; GROUPS],
+    /// Lines from the top down to the page's end.
+    rise: [u16; GROUPS],
+    /// The line after the last.
     bottom: [u16; GROUPS],
 }
 
 impl Drawn {
     /// All zeros, so that what begins with it needs no room in the kernel's image.
     pub(crate) const NOTHING: Self = Self {
-        top: [0; GROUPS],
+        rise: [0; GROUPS],
         bottom: [0; GROUPS],
     };
     pub(crate) const EVERYTHING: Self = Self {
-        top: [0; GROUPS],
+        rise: [HEIGHT as u16; GROUPS],
         bottom: [HEIGHT as u16; GROUPS],
     };
 
@@ -73,45 +76,54 @@ impl Drawn {
     ///
     /// # Panics
     /// If it leaves the picture.
+    #[inline]
     pub(crate) fn lane<const STEP: usize>(&mut self, x: u16, y: u16, len: u16) {
         let (last, bottom) = check_lane::<STEP>(x, y, len);
-        self.add(x, last, y, bottom);
+        if STEP == STRIDE {
+            self.add_to(usize::from(x / GROUP_PIXELS), y, bottom);
+        } else {
+            self.add(x, last, y, bottom);
+        }
     }
 
-    /// Adds the pixel columns `first..=last`, lines `top..bottom`.
+    /// Adds the pixel columns `first..=last`, lines `top..bottom`, all of them in the picture.
+    #[inline]
     fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
         for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
             self.add_to(group, top, bottom);
         }
     }
 
+    #[inline]
     fn add_to(&mut self, group: usize, top: u16, bottom: u16) {
-        let before = (self.top[group], self.bottom[group]);
-        let (top, bottom) = match before.0 < before.1 {
-            true => (top.min(before.0), bottom.max(before.1)),
-            false => (top, bottom),
-        };
-        (self.top[group], self.bottom[group]) = (top, bottom);
+        let rise = HEIGHT as u16 - top;
+        // Most lanes lie beside others: nothing is stored for them.
+        if self.rise[group] < rise {
+            self.rise[group] = rise;
+        }
+        if self.bottom[group] < bottom {
+            self.bottom[group] = bottom;
+        }
     }
-}
 
-impl Drawn {
     /// What either was drawn on.
     fn or(&self, other: &Self) -> Self {
         let mut both = *self;
         for group in 0..GROUPS {
-            if other.top[group] < other.bottom[group] {
-                both.add_to(group, other.top[group], other.bottom[group]);
-            }
+            both.add_to(
+                group,
+                HEIGHT as u16 - other.rise[group],
+                other.bottom[group],
+            );
         }
         both
     }
 
     /// The groups of 8 bytes drawn on, counted from the page's start, each with its line.
     pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, usize)> {
-        let lines = self.top.into_iter().zip(self.bottom);
-        lines.enumerate().flat_map(|(group, (top, bottom))| {
-            let lines = usize::from(top)..usize::from(bottom);
+        let lines = self.rise.into_iter().zip(self.bottom);
+        lines.enumerate().flat_map(|(group, (rise, bottom))| {
+            let lines = HEIGHT - usize::from(rise)..usize::from(bottom);
             lines.map(move |y| (y * GROUPS + group, y))
         })
     }
@@ -333,6 +345,7 @@ impl<B: Bus> Destination for Canvas<'_, B> {
         write(self.bus, SEQUENCER, MAP_MASK, 1 << (x & 3));
     }
 
+    #[inline]
     fn lane<const STEP: usize>(
         &mut self,
         x: u16,
@@ -362,6 +375,7 @@ impl<B: Bus> Destination for Canvas<'_, B> {
 }
 
 /// The last screen column of a lane, and the line after its last; checked to lie in the picture.
+#[inline]
 pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u16) {
     const {
         assert!(
@@ -369,16 +383,24 @@ pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u
             "columns, or every fourth pixel of a row"
         )
     };
-    let more = len.wrapping_sub(1);
-    let (right, down) = if STEP == STRIDE { (0, more) } else { (more, 0) };
-    assert!(
-        x < WIDTH as u16
-            && y < HEIGHT as u16
-            && right <= (WIDTH as u16 - 1 - x) / 4
-            && down < HEIGHT as u16 - y,
-        "{len} pixels, {STEP} bytes apart, at ({x}, {y}) are not in the picture"
-    );
-    (x + 4 * right, y + down + 1)
+    // Of an empty lane it is 65 535, which leaves the picture as well.
+    let more = u32::from(len.wrapping_sub(1));
+    let (right, down) = if STEP == STRIDE {
+        (0, more)
+    } else {
+        (4 * more, 0)
+    };
+    let (last, line) = (u32::from(x) + right, u32::from(y) + down);
+    if last >= WIDTH as u32 || line >= HEIGHT as u32 {
+        outside(x, y, len, STEP);
+    }
+    (last as u16, line as u16 + 1)
+}
+
+/// By itself, so that a lane which is in the picture has nothing to do with the words.
+#[cold]
+fn outside(x: u16, y: u16, len: u16, step: usize) -> ! {
+    panic!("{len} pixels, {step} bytes apart, at ({x}, {y}) are not in the picture")
 }
 
 fn page_start(page: usize) -> usize {

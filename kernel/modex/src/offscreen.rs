@@ -68,6 +68,7 @@ impl Destination for Offscreen {
         self.page.select(x);
     }
 
+    #[inline]
     fn lane<const STEP: usize>(
         &mut self,
         x: u16,

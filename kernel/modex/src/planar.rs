@@ -1,5 +1,7 @@
 //! A page in RAM, in the shape that the card has it.
 
+use core::ptr::NonNull;
+
 use crate::column::check_row;
 use crate::driver::check_lane;
 use crate::{Destination, HEIGHT, Lane, PAGE_BYTES, STRIDE, WIDTH};
@@ -48,6 +50,7 @@ impl Destination for PlanarBuffer {
     /// All planes can be reached at any time.
     fn select(&mut self, _: u16) {}
 
+    #[inline]
     fn lane<const STEP: usize>(
         &mut self,
         x: u16,
@@ -56,10 +59,14 @@ impl Destination for PlanarBuffer {
         draw: impl FnOnce(Lane<'_, STEP>),
     ) {
         check_lane::<STEP>(x, y, len);
-        let (x, top, bytes) = (usize::from(x), usize::from(y), usize::from(len) - 1);
-        let plane = &mut self.planes[x & 3];
-        let bytes = &mut plane[top * STRIDE + x / 4..][..bytes * STEP + 1];
-        draw(Lane::over(bytes));
+        let (x, top) = (usize::from(x), usize::from(y));
+        let first = NonNull::from(&mut self.planes).cast::<u8>();
+        // SAFETY: (x, y) is in the picture, so this is a byte of its plane.
+        let base = unsafe { first.add((x & 3) * PAGE_BYTES + top * STRIDE + x / 4) };
+        // SAFETY: the last pixel is in the picture, too, and `STEP` bytes are a line down or four
+        // pixels right: the lane lies in the plane from its first byte to its last. The exclusive
+        // borrow of the planes lives until `draw` returns.
+        draw(unsafe { Lane::new(base, len) });
     }
 
     fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {

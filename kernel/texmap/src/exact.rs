@@ -35,6 +35,7 @@ const SHORTEST: u8 = 16;
 const LEAST: u16 = 24;
 
 /// Draws a column of `len` pixels.
+#[inline(never)]
 pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_>) {
     let texels = texture.texels();
     let (width, height) = (texture.width(), texture.height());

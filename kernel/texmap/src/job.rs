@@ -2,10 +2,10 @@
 
 use core::iter;
 
-use modex::Destination;
+use modex::{Column, Destination};
 
 use crate::coverage::Axis;
-use crate::loops::Loop;
+use crate::loops::{Draw, DrawLinear, Loop};
 use crate::runs::{self, Pieces, Steps};
 use crate::{Texture, affine, exact, free, level, plane};
 
@@ -45,6 +45,27 @@ pub struct Style {
     pub affine: Loop,
     /// For rows.
     pub rows: Rows,
+}
+
+impl Style {
+    /// What draws so on this CPU.
+    pub(crate) fn tools(self) -> Tools {
+        Tools {
+            column: self.affine.draw(),
+            linear: self.affine.draw_linear(),
+            rows: self.rows,
+        }
+    }
+}
+
+/// A [`Style`] with its loop found: once for many runs.
+#[derive(Debug)]
+pub(crate) struct Tools {
+    /// Draws affine columns.
+    column: Draw,
+    /// Draws columns in linear pieces.
+    linear: DrawLinear,
+    rows: Rows,
 }
 
 /// One run to draw: where, and what the mapper needs to walk its texture.
@@ -146,23 +167,36 @@ impl Job {
     /// Draws the run.
     #[inline]
     pub fn draw(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
-        match &self.walk {
-            Walk::Free(walk) => {
-                self.straight(walk, |job| job.draw_line(style, texture, destination));
-            }
-            _ => self.draw_line(style, texture, destination),
+        self.draw_with(&style.tools(), texture, destination);
+    }
+
+    #[inline(always)]
+    pub(crate) fn draw_with(
+        &self,
+        tools: &Tools,
+        texture: &Texture<'_>,
+        destination: &mut impl Destination,
+    ) {
+        if self.plane().is_some() {
+            destination.select(self.x);
+            self.draw_column(tools, texture, destination);
+        } else {
+            self.draw_other(tools, texture, destination);
         }
     }
 
-    /// Draws the run, which keeps to its column or row.
-    #[inline]
-    fn draw_line(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
-        match self.axis {
-            Axis::Down => {
-                destination.select(self.x);
-                self.draw_column(style, texture, destination);
-            }
-            Axis::Right => self.draw_row(style, texture, destination),
+    /// Draws a row, or a run in the free direction.
+    #[inline(never)]
+    fn draw_other(&self, tools: &Tools, texture: &Texture<'_>, destination: &mut impl Destination) {
+        match &self.walk {
+            Walk::Free(walk) => self.straight(walk, |job| match job.axis {
+                Axis::Down => {
+                    destination.select(job.x);
+                    job.draw_column(tools, texture, destination);
+                }
+                Axis::Right => job.draw_row(tools.rows, texture, destination),
+            }),
+            _ => self.draw_row(tools.rows, texture, destination),
         }
     }
 
@@ -175,27 +209,52 @@ impl Job {
         texture: &Texture<'_>,
         destination: &mut impl Destination,
     ) {
-        match &self.walk {
-            Walk::Free(walk) => self.straight(walk, |job| {
-                job.draw_line_in_plane(plane, style, texture, destination);
-            }),
-            _ => self.draw_line_in_plane(plane, style, texture, destination),
+        if self.plane().is_none_or(|own| own == plane) {
+            self.draw_in_plane_with(plane, &style.tools(), texture, destination);
         }
     }
 
-    /// Draws those pixels of the run in `plane`, which is selected; it keeps to its column or row.
+    /// The plane of a run that keeps to its column. Any other may have pixels in each.
     #[inline]
-    fn draw_line_in_plane(
+    fn plane(&self) -> Option<u16> {
+        match (self.axis, &self.walk) {
+            (Axis::Right, _) | (_, Walk::Free(_)) => None,
+            (Axis::Down, _) => Some(self.x & 3),
+        }
+    }
+
+    /// Draws those pixels of the run in `plane`, which is selected; it is that of a column.
+    #[inline(always)]
+    pub(crate) fn draw_in_plane_with(
         &self,
         plane: u16,
-        style: Style,
+        tools: &Tools,
         texture: &Texture<'_>,
         destination: &mut impl Destination,
     ) {
-        match self.axis {
-            Axis::Down if self.x & 3 != plane => {}
-            Axis::Down => self.draw_column(style, texture, destination),
-            Axis::Right => self.draw_part(plane, texture, destination),
+        if self.plane().is_some() {
+            self.draw_column(tools, texture, destination);
+        } else {
+            self.draw_other_in_plane(plane, tools, texture, destination);
+        }
+    }
+
+    /// The same of a row, or a run in the free direction.
+    #[inline(never)]
+    fn draw_other_in_plane(
+        &self,
+        plane: u16,
+        tools: &Tools,
+        texture: &Texture<'_>,
+        destination: &mut impl Destination,
+    ) {
+        match &self.walk {
+            Walk::Free(walk) => self.straight(walk, |job| match job.axis {
+                Axis::Down if job.x & 3 != plane => {}
+                Axis::Down => job.draw_column(tools, texture, destination),
+                Axis::Right => job.draw_part(plane, texture, destination),
+            }),
+            _ => self.draw_part(plane, texture, destination),
         }
     }
 
@@ -217,24 +276,38 @@ impl Job {
     }
 
     /// A column, its plane selected.
-    fn draw_column(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
-        destination.lane(self.x, self.y, self.len, |column| match self.walk {
-            Walk::Affine(walk) => style.affine.column(texture, walk, column),
-            Walk::Exact(walk) => exact::column(texture, walk, self.len, column),
-            Walk::Wall(wall) => wall.column(texture, column),
-            Walk::Linear(walk, pieces) => {
-                runs::linear(texture, walk, self.len, pieces, style.affine, column);
-            }
-            Walk::Quadratic(walk, pieces) => {
-                runs::quadratic(texture, walk, self.len, pieces, column);
-            }
-            Walk::Free(_) => unreachable!("it is no column"),
+    #[inline(always)]
+    fn draw_column(
+        &self,
+        tools: &Tools,
+        texture: &Texture<'_>,
+        destination: &mut impl Destination,
+    ) {
+        destination.lane(self.x, self.y, self.len, |column| match &self.walk {
+            Walk::Affine(walk) => (tools.column)(texture, walk, column),
+            _ => self.fill(tools, texture, column),
         });
     }
 
+    /// Draws the pixels of a column that is not affine.
+    #[inline(never)]
+    fn fill(&self, tools: &Tools, texture: &Texture<'_>, column: Column<'_>) {
+        match &self.walk {
+            Walk::Linear(walk, pieces) => {
+                (tools.linear)(texture, walk, *pieces, tools.column, column);
+            }
+            &Walk::Quadratic(walk, pieces) => {
+                runs::quadratic(texture, walk, self.len, pieces, column);
+            }
+            &Walk::Exact(walk) => exact::column(texture, walk, self.len, column),
+            Walk::Wall(wall) => wall.column(texture, column),
+            Walk::Affine(_) | Walk::Free(_) => unreachable!("they are drawn elsewhere"),
+        }
+    }
+
     /// A row.
-    fn draw_row(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
-        match (style.rows, self.walk) {
+    fn draw_row(&self, rows: Rows, texture: &Texture<'_>, destination: &mut impl Destination) {
+        match (rows, self.walk) {
             (Rows::Multiply, Walk::Affine(walk)) => {
                 for i in 0..self.len {
                     let (u, v) = (
@@ -346,20 +419,19 @@ impl Coordinates {
 pub struct JobList<const N: usize> {
     jobs: [Job; N],
     len: usize,
-    /// For each job the next in its chain: see [`ByPlane`].
-    next: [u16; N],
+    /// For each job and plane the next in the chain: see [`ByPlane`].
+    next: [[u16; 4]; N],
 }
 
 /// The jobs of a list, plane by plane.
 ///
-/// A column is chained with those of its plane, and what may lie in every plane with its like: a
-/// pass sees its own jobs only.
+/// Each plane has a chain of the jobs that may have pixels in it: a pass sees its own jobs only.
 #[derive(Debug)]
 pub(crate) struct ByPlane<'a> {
     jobs: &'a [Job],
-    next: &'a [u16],
-    /// The first job in each plane's chain, and in that of all planes.
-    first: [u16; 5],
+    next: &'a [[u16; 4]],
+    /// The first job in each plane's chain.
+    first: [u16; 4],
 }
 
 impl<'a> ByPlane<'a> {
@@ -370,16 +442,11 @@ impl<'a> ByPlane<'a> {
     #[inline]
     pub fn plane(&self, plane: u16) -> impl Iterator<Item = &'a Job> {
         let (jobs, next) = (self.jobs, self.next);
-        let (mut own, mut every) = (self.first[usize::from(plane)], self.first[4]);
+        let plane = usize::from(plane);
+        let mut here = self.first[plane];
         iter::from_fn(move || {
-            let here = own.min(every);
             let job = jobs.get(usize::from(here))?;
-            let after = next[usize::from(here)];
-            if here == own {
-                own = after;
-            } else {
-                every = after;
-            }
+            here = next[usize::from(here)][plane];
             Some(job)
         })
     }
@@ -405,7 +472,7 @@ impl<const N: usize> JobList<N> {
         Self {
             jobs: [Self::EMPTY; N],
             len: 0,
-            next: [0; N],
+            next: [[0; 4]; N],
         }
     }
 
@@ -429,15 +496,15 @@ impl<const N: usize> JobList<N> {
     pub(crate) fn by_plane(&mut self) -> ByPlane<'_> {
         const { assert!(N <= ByPlane::END as usize, "a chain's links are 16 bits") };
         let (jobs, next) = (&self.jobs[..self.len], &mut self.next[..self.len]);
-        let mut first = [ByPlane::END; 5];
-        // From the last on: each goes before those that are chained.
+        let mut first = [ByPlane::END; 4];
+        // From the last on: each goes before those that are chained. What its link to the chains
+        // of other planes says nobody asks.
         for (i, (job, next)) in jobs.iter().zip(next.iter_mut()).enumerate().rev() {
-            let chain = match (job.axis, job.walk) {
-                (Axis::Right, _) | (_, Walk::Free(_)) => 4,
-                (Axis::Down, _) => usize::from(job.x & 3),
-            };
-            *next = first[chain];
-            first[chain] = i as u16;
+            *next = first;
+            match job.plane() {
+                Some(plane) => first[usize::from(plane)] = i as u16,
+                None => first = [i as u16; 4],
+            }
         }
         ByPlane { jobs, next, first }
     }

@@ -30,13 +30,19 @@
 
 use modex::Column;
 
-use crate::Texture;
-use crate::affine::{self, Walk};
-use steps::{Address, Crossed, Halves, Inside, Joint, Pair};
+use crate::affine::Walk;
+use crate::{Texture, plane, runs};
+use steps::{Address, Crossed, Halves, Joint, Pair};
 
 mod steps;
 #[cfg(target_arch = "x86_64")]
 mod tuned;
+
+/// Draws a column; panics as [`Loop::column`] does.
+pub(crate) type Draw = fn(&Texture<'_>, &Walk, Column<'_>);
+
+/// Draws a column in linear pieces, each by a [`Draw`].
+pub(crate) type DrawLinear = fn(&Texture<'_>, &plane::Walk, runs::Pieces, Draw, Column<'_>);
 
 /// A way to step a walk down a column.
 ///
@@ -134,36 +140,7 @@ impl Loop {
     /// If the walk leaves the texture, unless the loop wraps it around.
     #[inline]
     pub fn column(self, texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-        #[cfg(target_arch = "x86_64")]
-        self.tuned(texture, walk, column);
-        #[cfg(not(target_arch = "x86_64"))]
-        self.portable(texture, walk, column);
-    }
-
-    /// Draws a column with the loop's instructions, if this CPU has them.
-    #[cfg(target_arch = "x86_64")]
-    #[inline]
-    fn tuned(self, texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-        if column.is_empty() {
-            return;
-        }
-        let walk = self.walk(walk);
-        let inside = || Inside::new(texture, walk, column.len());
-        match (self, texture.bits()) {
-            (Self::TwoCarries, _) => tuned::two_carries(Address::new(inside()), column),
-            (Self::Packed, _) => tuned::packed(Halves::new(inside()), column),
-            (Self::TwoSteps, _) => tuned::two_steps(Address::new(inside()), column),
-            (Self::Shifts, Some(_)) => tuned::shifts(Pair::new(texture, walk), column),
-            (Self::Joined, Some(_)) => tuned::joined(Joint::new(texture, walk), column),
-            (Self::AddCarry, Some(bits)) => {
-                tuned::add_carry(Crossed::new(inside(), bits), column);
-            }
-            (Self::Extract, Some(_)) if tuned::has_extract() => {
-                tuned::extract(Joint::new(texture, walk), column);
-            }
-            (Self::Extract, Some(_)) => self.portable(texture, walk, column),
-            (_, None) | (Self::Multiply, _) => affine::column(texture, walk, column),
-        }
+        self.draw()(texture, &walk, column);
     }
 
     /// Draws a column with the loop's portable twin: the same registers, the same bits, on any
@@ -172,34 +149,65 @@ impl Loop {
     /// # Panics
     /// As [`Loop::column`].
     pub fn portable(self, texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-        if column.is_empty() {
-            return;
+        self.draw_portably()(texture, &walk, column);
+    }
+
+    /// What draws a column on this CPU: asked once for many of them.
+    pub(crate) fn draw(self) -> Draw {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Self::TwoCarries => {
+                return |texture, walk, column| tuned::two_carries(texture, *walk, column);
+            }
+            Self::Packed => return |texture, walk, column| tuned::packed(texture, *walk, column),
+            Self::TwoSteps => {
+                return |texture, walk, column| tuned::two_steps(texture, *walk, column);
+            }
+            Self::Shifts => return |texture, walk, column| tuned::shifts(texture, *walk, column),
+            Self::Joined => return |texture, walk, column| tuned::joined(texture, *walk, column),
+            Self::AddCarry => {
+                return |texture, walk, column| tuned::add_carry(texture, *walk, column);
+            }
+            Self::Extract if tuned::has_extract() => {
+                return |texture, walk, column| tuned::extract(texture, *walk, column);
+            }
+            Self::Extract | Self::Multiply => {}
         }
-        let walk = self.walk(walk);
-        let texels = texture.texels();
-        let inside = || Inside::new(texture, walk, column.len());
-        match (self, texture.bits()) {
-            (Self::TwoCarries | Self::TwoSteps, _) => {
-                let mut address = Address::new(inside());
-                column.fill(|| texels[address.next()]);
+        self.draw_portably()
+    }
+
+    /// What draws a column in linear pieces on this CPU. By the loops that are the fastest for
+    /// padded textures the pieces are drawn in place, by the others with [`Loop::draw`].
+    pub(crate) fn draw_linear(self) -> DrawLinear {
+        #[cfg(target_arch = "x86_64")]
+        match self {
+            Self::Shifts => {
+                return |texture, walk, pieces, draw, column| {
+                    runs::linear(texture, walk, pieces, draw, tuned::shifts_eights, column);
+                };
             }
-            (Self::Packed, _) => {
-                let mut halves = Halves::new(inside());
-                column.fill(|| texels[halves.next()]);
+            Self::Extract if tuned::has_extract() => {
+                return |texture, walk, pieces, draw, column| {
+                    runs::linear(texture, walk, pieces, draw, tuned::extract_eights, column);
+                };
             }
-            (Self::Shifts, Some(_)) => {
-                let mut pair = Pair::new(texture, walk);
-                column.fill(|| texels[pair.next()]);
-            }
-            (Self::Joined | Self::Extract, Some(_)) => {
-                let mut joint = Joint::new(texture, walk);
-                column.fill(|| texels[joint.next()]);
-            }
-            (Self::AddCarry, Some(bits)) => {
-                let mut crossed = Crossed::new(inside(), bits);
-                column.fill(|| texels[crossed.next()]);
-            }
-            (_, None) | (Self::Multiply, _) => affine::column(texture, walk, column),
+            _ => {}
+        }
+        |texture, walk, pieces, draw, column| {
+            let inline =
+                |texture: &Texture<'_>, walk, pixels: Column<'_>| draw(texture, &walk, pixels);
+            runs::linear(texture, walk, pieces, draw, inline, column);
+        }
+    }
+
+    fn draw_portably(self) -> Draw {
+        match self {
+            Self::Multiply => steps::multiply,
+            Self::TwoCarries | Self::TwoSteps => steps::column::<Address>,
+            Self::Packed => steps::column::<Halves>,
+            Self::Shifts => steps::column::<Pair>,
+            Self::Joined | Self::Extract => steps::column::<Joint>,
+            Self::AddCarry => steps::column::<Crossed>,
         }
     }
 }

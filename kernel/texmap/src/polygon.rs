@@ -48,9 +48,12 @@ pub struct Vertex {
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     texels: &'a [u8],
-    width: u16,
-    height: u16,
+    /// See [`Texture::last`].
+    last: (i32, i32),
     pitch: u16,
+    is_padded: bool,
+    /// See [`Texture::masks`].
+    masks: u64,
 }
 
 /// Why a texture can't be one.
@@ -96,9 +99,10 @@ impl<'a> Texture<'a> {
     /// The smallest texture: one texel of colour 0.
     pub const DOT: Texture<'static> = Texture {
         texels: &[0],
-        width: 1,
-        height: 1,
+        last: (0xFFFF, 0xFFFF),
         pitch: 1,
+        is_padded: true,
+        masks: 0,
     };
 
     /// A texture of `width` x `height` texels.
@@ -142,9 +146,10 @@ impl<'a> Texture<'a> {
         }
         Ok(Self {
             texels,
-            width,
-            height,
+            last: ((i32::from(width) << 16) - 1, (i32::from(height) << 16) - 1),
             pitch,
+            is_padded: pitch.is_power_of_two() && actual.is_power_of_two(),
+            masks: ((actual as u64 - u64::from(pitch)) << 32 | u64::from(pitch - 1)) << 16,
         })
     }
 
@@ -155,10 +160,18 @@ impl<'a> Texture<'a> {
 
     /// In a padded texture, the bits of a column's number and of a row's.
     pub fn bits(&self) -> Option<(u32, u32)> {
-        // Asked for every column: there are `pitch` x rows texels, and no division tells it.
-        let powers = self.pitch.is_power_of_two() && self.texels.len().is_power_of_two();
         let columns = self.pitch.trailing_zeros();
-        powers.then(|| (columns, self.texels.len().trailing_zeros() - columns))
+        self.is_padded
+            .then(|| (columns, self.texels.len().trailing_zeros() - columns))
+    }
+
+    /// In a padded texture, which bits of coordinates make the index: the column's are bits 16 and
+    /// up of u; the row's go on from them, 32 bits higher, in v times the pitch.
+    ///
+    /// Asked for every column, and therefore made with the texture.
+    #[inline]
+    pub(crate) fn masks(&self) -> Option<u64> {
+        self.is_padded.then_some(self.masks)
     }
 
     /// The texel at coordinates inside the texture, 16.16.
@@ -173,20 +186,18 @@ impl<'a> Texture<'a> {
 
     /// Texels across, 1 to 256.
     pub fn width(&self) -> u16 {
-        self.width
+        (self.last.0 >> 16) as u16 + 1
     }
 
     /// Texels down, 1 to 256.
     pub fn height(&self) -> u16 {
-        self.height
+        (self.last.1 >> 16) as u16 + 1
     }
 
     /// The last coordinate inside, 16.16: the last texel owns the far border, so u = width
     /// reads texel width - 1.
+    #[inline]
     pub fn last(&self) -> (i32, i32) {
-        (
-            (i32::from(self.width) << 16) - 1,
-            (i32::from(self.height) << 16) - 1,
-        )
+        self.last
     }
 }

@@ -79,11 +79,12 @@ impl Order {
         destination: &mut D,
         mapper: Mapper,
     ) {
-        let style = mapper.style();
+        let tools = mapper.style().tools();
         match self {
             Self::Polygons => {
                 for job in jobs.jobs() {
-                    job.draw(style, &textures[usize::from(job.texture)], destination);
+                    let texture = &textures[usize::from(job.texture)];
+                    job.draw_with(&tools, texture, destination);
                 }
             }
             Self::Planes | Self::Buffer => {
@@ -92,7 +93,7 @@ impl Order {
                     destination.select(plane);
                     for job in jobs.plane(plane) {
                         let texture = &textures[usize::from(job.texture)];
-                        job.draw_in_plane(plane, style, texture, destination);
+                        job.draw_in_plane_with(plane, &tools, texture, destination);
                     }
                 }
             }

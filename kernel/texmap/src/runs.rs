@@ -43,7 +43,7 @@
 
 use modex::Column;
 
-use crate::loops::Loop;
+use crate::loops::Draw;
 use crate::plane::Walk;
 use crate::{Texture, affine};
 
@@ -51,6 +51,9 @@ use crate::{Texture, affine};
 const MAX_STEPS: usize = modex::WIDTH - 1;
 /// Longest piece of [`Pieces::Powers`].
 const LONGEST_POWER: u16 = 64;
+
+/// Pieces whose ends are found at once.
+const BATCH: usize = 16;
 
 /// How a run is cut into pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -374,20 +377,90 @@ impl Cuts {
     }
 }
 
-/// Draws a column of `len` pixels, linear in each piece.
-pub fn linear(
+/// Draws a column, linear in each piece, by `draw`, or by `draw_inline`, which is
+/// the same one, but known here.
+#[inline(always)]
+pub(crate) fn linear(
     texture: &Texture<'_>,
-    walk: Walk,
-    len: u16,
+    walk: &Walk,
     pieces: Pieces,
-    by: Loop,
+    draw: Draw,
+    draw_inline: impl Fn(&Texture<'_>, affine::Walk, Column<'_>),
+    column: Column<'_>,
+) {
+    let (last, mut left) = (texture.last(), column.len() - 1);
+    // Both ends of the run are in the texture, before the eye: so is all between them.
+    let [width, height] = [last.0, last.1].map(|last| i64::from(last >> 16) + 1);
+    let needs_no_clamp = |[a, b, c]: [i64; 3]| a >= 0 && b >= 0 && a < width * c && b < height * c;
+    if !(needs_no_clamp(walk.at) && needs_no_clamp(walk.after(left))) {
+        return linear_clamped(texture, walk, pieces, draw, column);
+    }
+    let quotients = |[a, b, c]: [i64; 3]| {
+        let over = Reciprocal::new(c);
+        (over.times(a), over.times(b))
+    };
+    let mut at = walk.at;
+    let mut here = quotients(at);
+    let mut column = column;
+    let alike = match pieces {
+        Pieces::Of(steps) => u16::from(steps),
+        Pieces::Powers => LONGEST_POWER,
+        Pieces::Whole => 0,
+    };
+    // The last one may have another pixel.
+    if left > alike && alike.is_power_of_two() && alike >= 8 && texture.masks().is_some() {
+        let bits = alike.trailing_zeros();
+        let stride = walk.step.map(|step| step << bits);
+        let cut = |delta: i32| {
+            let up = if delta < 0 { i32::from(alike) - 1 } else { 0 };
+            (delta + up) >> bits
+        };
+        while left > alike {
+            // First all quotients, the divisions one after the other, then all pixels: both loops
+            // have their values in registers.
+            let all = ((left - 1) >> bits).min(BATCH as u16);
+            let mut ends = [(0, 0); BATCH];
+            let ends = &mut ends[..usize::from(all)];
+            for end in ends.iter_mut() {
+                at = [0, 1, 2].map(|k| at[k] + stride[k]);
+                *end = quotients(at);
+            }
+            let (pixels, rest) = column.split(all << bits);
+            for (&mut to, pixels) in ends.iter_mut().zip(pixels.chunks(alike)) {
+                let (u, v) = here;
+                let (du, dv) = (cut(to.0 - u), cut(to.1 - v));
+                draw_inline(texture, affine::Walk { u, v, du, dv }, pixels);
+                here = to;
+            }
+            left -= all << bits;
+            column = rest;
+        }
+    }
+    while !column.is_empty() {
+        let steps = pieces.next(left);
+        left -= steps;
+        at = [0, 1, 2].map(|k| at[k] + walk.step[k] * i64::from(steps));
+        let to = quotients(at);
+        let (pixels, rest) = column.split(steps + u16::from(left == 0));
+        draw(texture, &between(here, to, steps), pixels);
+        (here, column) = (to, rest);
+    }
+}
+
+/// The same where quotients may have to be clamped into the texture.
+#[cold]
+fn linear_clamped(
+    texture: &Texture<'_>,
+    walk: &Walk,
+    pieces: Pieces,
+    draw: Draw,
     mut column: Column<'_>,
 ) {
-    let mut cuts = Cuts::new(walk, len, pieces, texture);
+    let mut cuts = Cuts::new(*walk, column.len(), pieces, texture);
     while !column.is_empty() {
         let piece = cuts.next();
         let (pixels, rest) = column.split(piece.pixels);
-        by.column(texture, piece.straight(), pixels);
+        draw(texture, &piece.straight(), pixels);
         column = rest;
     }
 }
@@ -408,6 +481,7 @@ pub fn between(from: (i32, i32), to: (i32, i32), steps: u16) -> affine::Walk {
 }
 
 /// Draws a column of `len` pixels, quadratic in each piece.
+#[inline(never)]
 pub fn quadratic(
     texture: &Texture<'_>,
     walk: Walk,

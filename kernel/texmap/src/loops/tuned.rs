@@ -16,16 +16,35 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use modex::{Column, STRIDE};
 
-use super::steps::{Address, Crossed, Halves, Joint, Pair};
+use super::steps::{Address, Crossed, Halves, Joint, Pair, start};
+use crate::Texture;
+use crate::affine::Walk;
 
 /// Pixels in a block.
-const BLOCK: usize = 16;
+const BLOCK: usize = 32;
 const _: () = assert!(STRIDE == 80, "the offsets in `down` are multiples of 80");
 
 /// The frame, for a column that is not empty. `$first` prepares the flags; `$pixel!(offset)` is one
-/// pixel and its step: it stores to `{dest}` + offset, and uses what the operands after it name.
+/// pixel and its step: it stores to `{dest}` + offset, has `{texel}` and `{spare}` to itself, and
+/// uses what the operands after it name.
 macro_rules! down {
-    ($column:ident, $first:literal, $pixel:ident, $($operands:tt)*) => {{
+    ($column:ident, $first:literal, $pixel:ident, $($operands:tt)*) => {
+        down!(
+            @blocks $column, $first, $pixel, ($($operands)*)
+            "20" "0", "21" "80", "22" "160", "23" "240",
+            "24" "320", "25" "400", "26" "480", "27" "560",
+            "28" "640", "29" "720", "30" "800", "31" "880",
+            "32" "960", "33" "1040", "34" "1120", "35" "1200",
+            "36" "1280", "37" "1360", "38" "1440", "39" "1520",
+            "40" "1600", "41" "1680", "42" "1760", "43" "1840",
+            "44" "1920", "45" "2000", "46" "2080", "47" "2160",
+            "48" "2240", "49" "2320", "50" "2400", "51" "2480",
+        )
+    };
+    (
+        @blocks $column:ident, $first:literal, $pixel:ident, ($($operands:tt)*)
+        $($label:literal $offset:literal),*,
+    ) => {{
         let len = usize::from($column.len());
         // So many pixels of the first block are left out, as if the column began above its top.
         let left_out = len.wrapping_neg() % BLOCK;
@@ -35,68 +54,53 @@ macro_rules! down {
         // by its caller's argument. The stack is not used.
         unsafe {
             asm!(
-                "lea {entries}, [rip + 8f]",
-                "movsxd {entry}, dword ptr [{entries} + 4*{entry}]",
-                "add {entry}, {entries}",
+                "lea {spare}, [rip + 8f]",
+                "movsxd {texel}, dword ptr [{spare} + 4*{texel}]",
+                "add {texel}, {spare}",
                 $first,
-                "jmp {entry}",
+                "jmp {texel}",
                 ".p2align 2",
                 "8:",
-                ".long 20f - 8b",
-                ".long 21f - 8b",
-                ".long 22f - 8b",
-                ".long 23f - 8b",
-                ".long 24f - 8b",
-                ".long 25f - 8b",
-                ".long 26f - 8b",
-                ".long 27f - 8b",
-                ".long 28f - 8b",
-                ".long 29f - 8b",
-                ".long 30f - 8b",
-                ".long 31f - 8b",
-                ".long 32f - 8b",
-                ".long 33f - 8b",
-                ".long 34f - 8b",
-                ".long 35f - 8b",
-                "20:",
-                $pixel!("0"),
-                "21:",
-                $pixel!("80"),
-                "22:",
-                $pixel!("160"),
-                "23:",
-                $pixel!("240"),
-                "24:",
-                $pixel!("320"),
-                "25:",
-                $pixel!("400"),
-                "26:",
-                $pixel!("480"),
-                "27:",
-                $pixel!("560"),
-                "28:",
-                $pixel!("640"),
-                "29:",
-                $pixel!("720"),
-                "30:",
-                $pixel!("800"),
-                "31:",
-                $pixel!("880"),
-                "32:",
-                $pixel!("960"),
-                "33:",
-                $pixel!("1040"),
-                "34:",
-                $pixel!("1120"),
-                "35:",
-                $pixel!("1200"),
-                "lea {dest}, [{dest} + 1280]",
+                $(concat!(".long ", $label, "f - 8b"),)*
+                "9:",
+                $(concat!($label, ":"), $pixel!($offset),)*
+                "lea {dest}, [{dest} + {bytes}]",
                 "dec {blocks:e}",
-                "jnz 20b",
+                "jnz 9b",
                 dest = inout(reg) dest => _,
+                bytes = const BLOCK * STRIDE,
                 blocks = inout(reg) len.div_ceil(BLOCK) => _,
-                entry = inout(reg) left_out => _,
-                entries = out(reg) _,
+                texel = inout(reg_abcd) left_out => _,
+                spare = out(reg) _,
+                $($operands)*
+                options(nostack),
+            );
+        }
+    }};
+}
+
+/// The same for a column of whole eights, at least one: no entry is looked for.
+macro_rules! eights {
+    ($column:ident, $pixel:ident, $($operands:tt)*) => {{
+        // SAFETY: as in `down`.
+        unsafe {
+            asm!(
+                ".p2align 4",
+                "2:",
+                $pixel!("0"),
+                $pixel!("80"),
+                $pixel!("160"),
+                $pixel!("240"),
+                $pixel!("320"),
+                $pixel!("400"),
+                $pixel!("480"),
+                $pixel!("560"),
+                "lea {dest}, [{dest} + 640]",
+                "dec {blocks:e}",
+                "jnz 2b",
+                dest = inout(reg) $column.as_ptr() => _,
+                blocks = inout(reg) u32::from($column.len() / 8) => _,
+                texel = out(reg_abcd) _,
                 $($operands)*
                 options(nostack),
             );
@@ -105,8 +109,8 @@ macro_rules! down {
 }
 
 /// The address and two fractions, each carry tested.
-#[inline]
-pub(super) fn two_carries(start: Address<'_>, mut column: Column<'_>) {
+#[inline(always)]
+pub(super) fn two_carries(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -126,8 +130,11 @@ pub(super) fn two_carries(start: Address<'_>, mut column: Column<'_>) {
             )
         };
     }
-    debug_assert_eq!(start.len, column.len());
-    let at = start.texels.as_ptr().wrapping_add(start.at);
+    let Some((start, mut column)) = start::<Address>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
+    let at = texels.wrapping_add(start.at);
     let [carried, step] = start.steps;
     down!(column, "", pixel,
         at = inout(reg) at => _,
@@ -137,14 +144,13 @@ pub(super) fn two_carries(start: Address<'_>, mut column: Column<'_>) {
         dv = in(reg) start.dv,
         step = in(reg) step,
         pitch = in(reg) carried - step,
-        texel = out(reg) _,
     );
 }
 
 /// Both fractions in one register: the carry of the upper goes out of it into the address, the
 /// lower's into a bit that is tested.
-#[inline]
-pub(super) fn packed(start: Halves<'_>, mut column: Column<'_>) {
+#[inline(always)]
+pub(super) fn packed(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -162,23 +168,25 @@ pub(super) fn packed(start: Halves<'_>, mut column: Column<'_>) {
             )
         };
     }
-    debug_assert_eq!(start.len, column.len());
-    let at = start.texels.as_ptr().wrapping_add(start.at);
+    let Some((start, mut column)) = start::<Halves>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
+    let at = texels.wrapping_add(start.at);
     down!(column, "", pixel,
         at = inout(reg) at => _,
         fractions = inout(reg) start.fractions => _,
         step_fractions = in(reg) start.step_fractions,
         step = in(reg) start.step,
         pitch = in(reg) start.pitch,
-        texel = out(reg) _,
         carry = const Halves::CARRY,
         clear = const !Halves::CARRY as i32,
     );
 }
 
 /// SBB makes 0 or -1 of v's carry, which picks the step; u's carry goes in with it.
-#[inline]
-pub(super) fn two_steps(start: Address<'_>, mut column: Column<'_>) {
+#[inline(always)]
+pub(super) fn two_steps(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -193,30 +201,34 @@ pub(super) fn two_steps(start: Address<'_>, mut column: Column<'_>) {
             )
         };
     }
-    debug_assert_eq!(start.len, column.len());
-    let at = start.texels.as_ptr().wrapping_add(start.at);
+    let Some((start, mut column)) = start::<Address>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
+    let at = texels.wrapping_add(start.at);
+    // By themselves: all of `start` would be in memory.
+    let steps = start.steps;
     down!(column, "", pixel,
         at = inout(reg) at => _,
         u = inout(reg) start.u => _,
         v = inout(reg) start.v => _,
         du = in(reg) start.du,
         dv = in(reg) start.dv,
-        steps = in(reg) start.steps.as_ptr(),
-        texel = out(reg) _,
+        steps = in(reg) steps.as_ptr(),
     );
 }
 
 /// Two accumulators, a mask for each, one shift.
-#[inline]
-pub(super) fn shifts(start: Pair<'_>, mut column: Column<'_>) {
+#[inline(always)]
+pub(super) fn shifts(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
                 "mov {texel:e}, {v:e}\n",
                 "and {texel:e}, {v_mask:e}\n",
-                "mov {columns:e}, {u:e}\n",
-                "and {columns:e}, {u_mask:e}\n",
-                "or {texel:e}, {columns:e}\n",
+                "mov {spare:e}, {u:e}\n",
+                "and {spare:e}, {u_mask:e}\n",
+                "or {texel:e}, {spare:e}\n",
                 "shr {texel:e}, 16\n",
                 "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
                 "mov byte ptr [{dest} + ",
@@ -227,30 +239,68 @@ pub(super) fn shifts(start: Pair<'_>, mut column: Column<'_>) {
             )
         };
     }
+    let Some((start, mut column)) = start::<Pair>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
     down!(column, "", pixel,
-        texels = in(reg) start.texels.as_ptr(),
+        texels = in(reg) texels,
         u = inout(reg) start.u => _,
         v = inout(reg) start.v => _,
         du = in(reg) start.du,
         dv = in(reg) start.dv,
         u_mask = in(reg) start.u_mask,
         v_mask = in(reg) start.v_mask,
-        texel = out(reg) _,
-        columns = out(reg) _,
+    );
+}
+
+#[inline(always)]
+pub(super) fn shifts_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "mov {texel:e}, {v:e}\n",
+                "and {texel:e}, {v_mask:e}\n",
+                "mov {spare:e}, {u:e}\n",
+                "and {spare:e}, {u_mask:e}\n",
+                "or {texel:e}, {spare:e}\n",
+                "shr {texel:e}, 16\n",
+                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {u:e}, {du:e}\n",
+                "add {v:e}, {dv:e}",
+            )
+        };
+    }
+    let Some((start, mut column)) = start::<Pair>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
+    eights!(column, pixel,
+        spare = out(reg) _,
+        texels = in(reg) texels,
+        u = inout(reg) start.u => _,
+        v = inout(reg) start.v => _,
+        du = in(reg) start.du,
+        dv = in(reg) start.dv,
+        u_mask = in(reg) start.u_mask,
+        v_mask = in(reg) start.v_mask,
     );
 }
 
 /// One accumulator and one mask, the row's bits shifted down to the column's.
-#[inline]
-pub(super) fn joined(start: Joint<'_>, mut column: Column<'_>) {
+#[inline(always)]
+pub(super) fn joined(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
                 "mov {texel}, {at}\n",
                 "and {texel}, {mask}\n",
-                "mov {rows}, {texel}\n",
-                "shr {rows}, 32\n",
-                "or {texel:e}, {rows:e}\n",
+                "mov {spare}, {texel}\n",
+                "shr {spare}, 32\n",
+                "or {texel:e}, {spare:e}\n",
                 "shr {texel:e}, 16\n",
                 "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
                 "mov byte ptr [{dest} + ",
@@ -260,81 +310,96 @@ pub(super) fn joined(start: Joint<'_>, mut column: Column<'_>) {
             )
         };
     }
+    let Some((start, mut column)) = start::<Joint>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
     down!(column, "", pixel,
-        texels = in(reg) start.texels.as_ptr(),
+        texels = in(reg) texels,
         at = inout(reg) start.at => _,
         step = in(reg) start.step,
         mask = in(reg) start.mask,
-        texel = out(reg) _,
-        rows = out(reg) _,
     );
 }
 
 /// The two registers cross their carries. How the row is scaled depends on the pitch, because no
 /// shift leaves the flags alone: by the scale of addresses, or by moving a byte.
-#[inline]
-pub(super) fn add_carry(start: Crossed<'_>, column: Column<'_>) {
+#[inline(always)]
+pub(super) fn add_carry(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+    let Some((start, mut column)) = start::<Crossed>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
     macro_rules! crossed {
         ($($index:literal),+) => {{
             macro_rules! pixel {
                 ($offset:literal) => {
                     concat!(
                         $($index, "\n",)+
-                        "movzx eax, byte ptr [{texels} + rax]\n",
+                        "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
                         "mov byte ptr [{dest} + ",
                         $offset,
-                        "], al\n",
-                        "adc rdx, {row_step}\n",
+                        "], {texel:l}\n",
+                        "adc {row}, {row_step}\n",
                         "adc {column}, {column_step}",
                     )
                 };
             }
-            let mut lane = column;
-            debug_assert_eq!(start.len, lane.len());
-            down!(lane, "bt {carry:e}, 0", pixel,
-                texels = in(reg) start.texels.as_ptr(),
-                inout("rdx") start.row => _,
+            down!(column, "bt {carry:e}, 0", pixel,
+                texels = in(reg) texels,
+                row = inout(reg_abcd) start.row => _,
                 column = inout(reg) start.column => _,
                 row_step = in(reg) start.row_step,
                 column_step = in(reg) start.column_step,
                 carry = in(reg) u32::from(start.carry),
-                out("rax") _,
             );
         }};
     }
     match start.columns {
-        0 => crossed!("mov eax, edx", "lea eax, [{column} + rax]"),
-        1 => crossed!("mov eax, edx", "lea eax, [{column} + rax*2]"),
-        2 => crossed!("mov eax, edx", "lea eax, [{column} + rax*4]"),
-        3 => crossed!("mov eax, edx", "lea eax, [{column} + rax*8]"),
+        0 => crossed!(
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{column} + {texel}]"
+        ),
+        1 => crossed!(
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{column} + {texel}*2]"
+        ),
+        2 => crossed!(
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{column} + {texel}*4]"
+        ),
+        3 => crossed!(
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{column} + {texel}*8]"
+        ),
         4 => crossed!(
-            "mov eax, edx",
-            "lea eax, [rax + rax]",
-            "lea eax, [{column} + rax*8]"
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{texel} + {texel}]",
+            "lea {texel:e}, [{column} + {texel}*8]"
         ),
         5 => crossed!(
-            "mov eax, edx",
-            "lea eax, [rax*4]",
-            "lea eax, [{column} + rax*8]"
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{texel}*4]",
+            "lea {texel:e}, [{column} + {texel}*8]"
         ),
         6 => crossed!(
-            "mov eax, edx",
-            "lea eax, [rax*8]",
-            "lea eax, [{column} + rax*8]"
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{texel}*8]",
+            "lea {texel:e}, [{column} + {texel}*8]"
         ),
         7 => crossed!(
-            "mov eax, edx",
-            "lea eax, [rax + rax]",
-            "lea eax, [rax*8]",
-            "lea eax, [{column} + rax*8]"
+            "mov {texel:e}, {row:e}",
+            "lea {texel:e}, [{texel} + {texel}]",
+            "lea {texel:e}, [{texel}*8]",
+            "lea {texel:e}, [{column} + {texel}*8]"
         ),
-        _ => crossed!("mov eax, {column:e}", "mov ah, dl"),
+        _ => crossed!("mov {texel:e}, {column:e}", "mov {texel:h}, {row:l}"),
     }
 }
 
 /// One accumulator, and an instruction that gathers the bits of the index. The CPU must have it.
-#[inline]
-pub(super) fn extract(start: Joint<'_>, mut column: Column<'_>) {
+#[inline(always)]
+pub(super) fn extract(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -347,12 +412,41 @@ pub(super) fn extract(start: Joint<'_>, mut column: Column<'_>) {
             )
         };
     }
+    let Some((start, mut column)) = start::<Joint>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
     down!(column, "", pixel,
-        texels = in(reg) start.texels.as_ptr(),
+        texels = in(reg) texels,
         at = inout(reg) start.at => _,
         step = in(reg) start.step,
         mask = in(reg) start.mask,
-        texel = out(reg) _,
+    );
+}
+
+#[inline(always)]
+pub(super) fn extract_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+    macro_rules! pixel {
+        ($offset:literal) => {
+            concat!(
+                "pext {texel}, {at}, {mask}\n",
+                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
+                "mov byte ptr [{dest} + ",
+                $offset,
+                "], {texel:l}\n",
+                "add {at}, {step}",
+            )
+        };
+    }
+    let Some((start, mut column)) = start::<Joint>(texture, walk, column) else {
+        return;
+    };
+    let texels = texture.texels().as_ptr();
+    eights!(column, pixel,
+        texels = in(reg) texels,
+        at = inout(reg) start.at => _,
+        step = in(reg) start.step,
+        mask = in(reg) start.mask,
     );
 }
 
