@@ -37,7 +37,6 @@ const LEAST: u16 = 24;
 /// Draws a column of `len` pixels.
 #[inline(never)]
 pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_>) {
-    let texels = texture.texels();
     let (width, height) = (texture.width(), texture.height());
     let (w, h) = (i64::from(width), i64::from(height));
     let needs_no_clamp = |&row: &u16| {
@@ -50,7 +49,7 @@ pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_
 
     let clamped = |[a, b, c]: [i64; 3]| {
         let (u, v) = (texel(a, c, width), texel(b, c, height));
-        texels[usize::from(v) * usize::from(texture.pitch()) + usize::from(u)]
+        texture.texel(u.into(), v.into())
     };
     let (above, rest) = column.split(first);
     let (inside, below) = rest.split(end - first);
@@ -67,7 +66,7 @@ pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_
 /// The texel at a pixel that needs no clamp.
 #[inline(always)]
 fn quotient(texture: &Texture<'_>, [a, b, c]: [i64; 3]) -> u8 {
-    texture.texels()[(b / c) as usize * usize::from(texture.pitch()) + (a / c) as usize]
+    texture.texel((a / c) as usize, (b / c) as usize)
 }
 
 /// Divides at every pixel.
@@ -105,7 +104,6 @@ fn estimated(
     margin: i32,
     mut column: Column<'_>,
 ) {
-    let (texels, pitch) = (texture.texels(), usize::from(texture.pitch()));
     let mut cuts = Cuts::new(walk, column.len(), pieces, texture);
     let mut i = 0;
     while !column.is_empty() {
@@ -124,7 +122,7 @@ fn estimated(
             if (((u ^ u_most) | (v ^ v_most)) as u32) >> 16 != 0 {
                 return quotient(texture, walk.after(at));
             }
-            texels[(v_most >> 16) as usize * pitch + (u_most >> 16) as usize]
+            texture.at(u_most, v_most)
         });
         column = rest;
     }

@@ -117,11 +117,9 @@ impl Wall {
 
     /// Draws a column.
     pub(crate) fn column(self, texture: &Texture<'_>, column: Column<'_>) {
-        let texels = &texture.texels()[(self.u >> 16) as usize..];
-        let pitch = usize::from(texture.pitch());
-        let mut v = self.v;
+        let (u, mut v) = ((self.u >> 16) as usize, self.v);
         column.fill(|| {
-            let texel = texels[(v >> 16) as usize * pitch];
+            let texel = texture.texel(u, (v >> 16) as usize);
             v += self.dv;
             texel
         });

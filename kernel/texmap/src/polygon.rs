@@ -44,7 +44,9 @@ pub struct Vertex {
 /// A rectangle of texels, row by row. Texel (i, j) covers [i, i + 1) x [j, j + 1).
 ///
 /// The rows lie `pitch` texels apart. In a *padded* texture the pitch and the number of rows are
-/// powers of two: an index put together from masked coordinates can't leave it.
+/// powers of two: an index put together from masked coordinates can't leave it. A *tiled* one is a
+/// rectangle laid out of one tile, of which alone there are texels: whatever is said of coordinates
+/// in a texture is said of the rectangle, and only the index wraps around.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     texels: &'a [u8],
@@ -54,6 +56,8 @@ pub struct Texture<'a> {
     is_padded: bool,
     /// See [`Texture::masks`].
     masks: u64,
+    /// Those bits of a column's number and of a row's that are the tile's.
+    wrap: (u16, u16),
 }
 
 /// Why a texture can't be one.
@@ -103,7 +107,10 @@ impl<'a> Texture<'a> {
         pitch: 1,
         is_padded: true,
         masks: 0,
+        wrap: Self::WHOLE,
     };
+    /// What [`Texture::wrap`] is where nothing wraps.
+    const WHOLE: (u16, u16) = (u16::MAX, u16::MAX);
 
     /// A texture of `width` x `height` texels.
     ///
@@ -121,6 +128,38 @@ impl<'a> Texture<'a> {
     pub fn padded(texels: &'a [u8], width: u16, height: u16) -> Result<Self, TextureError> {
         let [pitch, rows] = [width, height].map(|k| k.min(Self::MAX_SIDE).next_power_of_two());
         Self::with_rows(texels, width, height, pitch, rows)
+    }
+
+    /// A texture of `width` x `height` texels, laid out of a tile of `tile.0` x `tile.1`, whose
+    /// `texels` are given. The tile's sides are powers of two.
+    ///
+    /// # Errors
+    /// A side outside 1 to 256, or a slice of another length.
+    ///
+    /// # Panics
+    /// If a side of the tile is no power of two.
+    pub fn tiled(
+        texels: &'a [u8],
+        tile: (u16, u16),
+        width: u16,
+        height: u16,
+    ) -> Result<Self, TextureError> {
+        assert!(
+            tile.0.is_power_of_two() && tile.1.is_power_of_two(),
+            "a tile of {} x {} texels does not wrap by masks",
+            tile.0,
+            tile.1
+        );
+        Ok(Self {
+            wrap: (tile.0 - 1, tile.1 - 1),
+            ..Self::with_rows(texels, width, height, tile.0, tile.1)?
+        })
+    }
+
+    /// The sides of the tile that a tiled texture is laid out of.
+    pub fn tile(&self) -> Option<(u16, u16)> {
+        let (column, row) = self.wrap;
+        (self.wrap != Self::WHOLE).then(|| (column + 1, row + 1))
     }
 
     /// Texels of a padded texture.
@@ -150,6 +189,7 @@ impl<'a> Texture<'a> {
             pitch,
             is_padded: pitch.is_power_of_two() && actual.is_power_of_two(),
             masks: ((actual as u64 - u64::from(pitch)) << 32 | u64::from(pitch - 1)) << 16,
+            wrap: Self::WHOLE,
         })
     }
 
@@ -175,11 +215,20 @@ impl<'a> Texture<'a> {
     }
 
     /// The texel at coordinates inside the texture, 16.16.
+    #[inline]
     pub fn at(&self, u: i32, v: i32) -> u8 {
-        self.texels[(v >> 16) as usize * usize::from(self.pitch) + (u >> 16) as usize]
+        self.texel((u >> 16) as usize, (v >> 16) as usize)
     }
 
-    /// The texels, row by row, `pitch` apart.
+    /// The texel in a column and a row of the texture.
+    #[inline(always)]
+    pub(crate) fn texel(&self, column: usize, row: usize) -> u8 {
+        let (wrap_column, wrap_row) = self.wrap;
+        let row = row & usize::from(wrap_row);
+        self.texels[row * usize::from(self.pitch) + (column & usize::from(wrap_column))]
+    }
+
+    /// The texels, row by row, `pitch` apart; of a tiled texture the tile's.
     pub fn texels(&self) -> &'a [u8] {
         self.texels
     }

@@ -490,7 +490,6 @@ pub fn quadratic(
     mut column: Column<'_>,
 ) {
     let mut cuts = Cuts::new(walk, len, pieces, texture);
-    let (texels, pitch) = (texture.texels(), usize::from(texture.pitch()));
     while !column.is_empty() {
         let piece = cuts.quadratic();
         let (pixels, rest) = column.split(piece.pixels);
@@ -499,7 +498,7 @@ pub fn quadratic(
             let [mut u, mut v] = [piece.paths[0][half], piece.paths[1][half]];
             lane.fill(|| {
                 let (u, v) = (u.next() >> 48, v.next() >> 48);
-                texels[v as usize * pitch + u as usize]
+                texture.texel(u as usize, v as usize)
             });
         }
         column = rest;

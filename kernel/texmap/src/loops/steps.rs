@@ -68,12 +68,16 @@ struct Inside {
 }
 
 impl Inside {
-    /// `walk` over `len` pixels, at least one.
+    /// `walk` over `len` pixels, at least one; none in a tiled texture, where an index does not go
+    /// on as the walk does.
     ///
     /// # Panics
     /// If it leaves the texture.
     #[inline]
-    fn new(texture: &Texture<'_>, walk: Walk, len: u16) -> Self {
+    fn new(texture: &Texture<'_>, walk: Walk, len: u16) -> Option<Self> {
+        if texture.tile().is_some() {
+            return None;
+        }
         let steps = i64::from(len) - 1;
         let inside = |from: i32, step: i32, last: i32| {
             // Without a sign, what is below zero is above all that is inside.
@@ -85,7 +89,7 @@ impl Inside {
             outside();
         }
         let pitch = texture.pitch();
-        Self { pitch, walk }
+        Some(Self { pitch, walk })
     }
 
     /// The first pixel's texel. Both coordinates are at least zero.
@@ -123,7 +127,7 @@ pub(super) struct Address {
 impl Registers for Address {
     #[inline]
     fn new(texture: &Texture<'_>, walk: Walk, len: u16) -> Option<Self> {
-        let inside = Inside::new(texture, walk, len);
+        let inside = Inside::new(texture, walk, len)?;
         let fraction = |at: i32| (at as u32) << 16;
         let Walk { u, v, du, dv } = inside.walk;
         let step = inside.whole_step();
@@ -167,7 +171,7 @@ impl Halves {
 impl Registers for Halves {
     #[inline]
     fn new(texture: &Texture<'_>, walk: Walk, len: u16) -> Option<Self> {
-        let inside = Inside::new(texture, Loop::Packed.walk(walk), len);
+        let inside = Inside::new(texture, Loop::Packed.walk(walk), len)?;
         let fractions = |u: i32, v: i32| (u as u32) << 16 | (v as u32 & 0xFFFF) >> 1;
         let Walk { u, v, du, dv } = inside.walk;
         Some(Self {
@@ -288,7 +292,7 @@ impl Registers for Crossed {
     #[inline]
     fn new(texture: &Texture<'_>, walk: Walk, len: u16) -> Option<Self> {
         let (columns, _) = texture.bits()?;
-        let inside = Inside::new(texture, walk, len);
+        let inside = Inside::new(texture, walk, len)?;
         let fraction = |at: i32| u64::from(at as u32 & 0xFFFF) << 48;
         let whole = |at: i32| i64::from(at >> 16) as u64;
         let one_part = 1 << 32;
