@@ -55,7 +55,7 @@ impl Room {
     /// Draws an accepted pack in some pose, by some mapper.
     fn draw(&mut self, pack: &Pack<'_>, random: &mut Rng) {
         let entry = pack.entry(&mut self.arena);
-        let textures = [entry.paint(&mut self.painted)];
+        let textures = entry.paint(&mut self.painted);
         let mut stage = Stage::new(&mut self.storage, entry.scene(&textures));
         stage.set_mapper(Mapper::ALL[random.usize(..Mapper::ALL.len())].1);
         let mut pose = Pose {

@@ -156,14 +156,14 @@ fn compare_coverage(
 #[test]
 fn every_golden_is_what_the_oracle_draws() {
     let mut texels = Box::new([0; MAX_TEXELS]);
-    let textures = [CATALOGUE[0].paint(&mut texels)];
+    let textures = CATALOGUE[0].paint(&mut texels);
     let mut storage = Box::new(Storage::new());
     let mut stage = Stage::new(&mut storage, CATALOGUE[0].scene(&textures));
     let mut between = 0;
     for golden in golden::find(&golden::folder()).unwrap() {
         let entry = scene(&golden);
         let mut texels = Box::new([0; MAX_TEXELS]);
-        stage.set(entry.scene(&[entry.paint(&mut texels)]));
+        stage.set(entry.scene(&entry.paint(&mut texels)));
         let pose = pose(&golden);
         // The committed picture.
         let picture = golden.picture().unwrap().expect("it was blessed");

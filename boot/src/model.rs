@@ -118,7 +118,7 @@ impl Model {
         let obj = obj::parse(obj)?;
         let pattern = Entry::parse(PATTERN).expect("it is in the catalogue");
         let mut painted = Box::new([0; MAX_TEXELS]);
-        let painted = pattern.paint(&mut painted);
+        let painted = pattern.paint(&mut painted)[0];
         let pattern = pattern.scene(&[]);
         let (side_u, side_v) = (painted.width().into(), painted.height().into());
         let size = picture.map_or((side_u, side_v), image::RgbImage::dimensions);

@@ -125,7 +125,7 @@ pub fn with_entry<T>(entry: &Entry<'_>, look: impl FnOnce(&Subject<'_>) -> T) ->
 pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = Box::new(Storage::new());
-    let textures = [entry.paint(&mut texels)];
+    let textures = entry.paint(&mut texels);
     let mut stage = Stage::new(&mut storage, entry.scene(&textures));
     let about = entry.about.to_string();
     look(&Subject::new(entry.name, about, &mut stage, poses))
@@ -136,7 +136,7 @@ fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = Box::new(Storage::new());
     let entry = Entry::parse("tilted").expect("it is in the catalogue");
-    let textures = [entry.paint(&mut texels)];
+    let textures = entry.paint(&mut texels);
     let (vertices, corners, faces) = random_mesh(seed);
     let mesh = Mesh {
         vertices: &vertices,

@@ -429,7 +429,7 @@ mod tests {
         let mut arena = Box::new(Arena::new());
         let entry = pack.entry(&mut arena);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
-        let textures = [entry.paint(&mut painted)];
+        let textures = entry.paint(&mut painted);
         let (scene, cube) = (
             entry.scene(&textures),
             Entry::parse("cube").unwrap().scene(&[]),
@@ -568,7 +568,7 @@ mod tests {
         let entry = pack.entry(&mut arena);
         let mut storage = Box::new(Storage::new());
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
-        let textures = [entry.paint(&mut painted)];
+        let textures = entry.paint(&mut painted);
         let mut stage = Stage::new(&mut storage, entry.scene(&textures));
         let pose = Pose {
             distance: Pose::MAX_DISTANCE,

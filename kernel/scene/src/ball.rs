@@ -65,6 +65,7 @@ pub fn ball<'t>(textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
         palette: &PALETTE,
         light: &LIGHT_TABLE,
         background: &BACKGROUND,
+        mipmaps: false,
     }
 }
 

@@ -5,15 +5,17 @@
 //! A solid that is loaded is an [`Entry`] as well, and whoever shows scenes need not know which
 //! ones are built in.
 
+use core::ops::Deref;
+
 use modex::{HEIGHT, Palette};
 use texmap::Texture;
 
 use crate::ball::{self, TEXELS, paint_ball};
 use crate::colour::{BACKGROUND, LEVEL_BACKGROUND, LIGHT_TABLE, PALETTE};
-use crate::knot;
 use crate::surfaces::{self, SIDE};
 use crate::trig::sin;
 use crate::{Corner, Face, LightTable, MAX_EXTENT, Mesh, Pose, Scene, Vec3};
+use crate::{corridor, knot};
 
 /// Texels of the largest texture in the catalogue: the memory that [`Entry::paint`] is lent.
 pub const MAX_TEXELS: usize = SIDE * SIDE;
@@ -30,6 +32,7 @@ pub struct Entry<'a> {
     colours: Colours<'a>,
     background: &'a [u8; HEIGHT],
     cover: Cover<'a>,
+    mipmaps: bool,
     pose: fn(u32) -> Pose,
 }
 
@@ -50,11 +53,47 @@ impl Colours<'static> {
     };
 }
 
-/// Where an entry's one texture comes from.
+/// Most textures of an entry.
+const MAX_TEXTURES: usize = 2;
+
+/// An entry's textures.
+#[derive(Clone, Copy, Debug)]
+pub struct Textures<'t> {
+    all: [Texture<'t>; MAX_TEXTURES],
+    len: usize,
+}
+
+impl<'t> Deref for Textures<'t> {
+    type Target = [Texture<'t>];
+
+    fn deref(&self) -> &Self::Target {
+        &self.all[..self.len]
+    }
+}
+
+impl<'t> From<Texture<'t>> for Textures<'t> {
+    fn from(texture: Texture<'t>) -> Self {
+        Self {
+            all: [texture; MAX_TEXTURES],
+            len: 1,
+        }
+    }
+}
+
+impl<'t> From<[Texture<'t>; MAX_TEXTURES]> for Textures<'t> {
+    fn from(all: [Texture<'t>; MAX_TEXTURES]) -> Self {
+        Self {
+            all,
+            len: MAX_TEXTURES,
+        }
+    }
+}
+
+/// Where an entry's textures come from.
 #[derive(Clone, Copy, Debug)]
 enum Cover<'a> {
-    /// It is painted by code.
-    Painted(for<'m> fn(&'m mut [u8; MAX_TEXELS]) -> Texture<'m>),
+    /// They are painted by code.
+    Painted(for<'m> fn(&'m mut [u8; MAX_TEXELS]) -> Textures<'m>),
     /// It is there.
     Loaded(Texture<'a>),
 }
@@ -77,18 +116,19 @@ impl<'a> Entry<'a> {
             colours,
             background,
             cover: Cover::Loaded(texture),
+            mipmaps: false,
             pose: Pose::at_tick,
         }
     }
 
-    /// Its one texture in full light; one that has to be painted is painted into `texels`.
-    pub fn paint<'m>(&self, texels: &'m mut [u8; MAX_TEXELS]) -> Texture<'m>
+    /// Its textures in full light; what has to be painted is painted into `texels`.
+    pub fn paint<'m>(&self, texels: &'m mut [u8; MAX_TEXELS]) -> Textures<'m>
     where
         'a: 'm,
     {
         match self.cover {
             Cover::Painted(paint) => paint(texels),
-            Cover::Loaded(texture) => texture,
+            Cover::Loaded(texture) => texture.into(),
         }
     }
 
@@ -104,6 +144,7 @@ impl<'a> Entry<'a> {
             palette: self.colours.palette,
             light: self.colours.light,
             background: self.background,
+            mipmaps: self.mipmaps,
         }
     }
 
@@ -121,7 +162,7 @@ impl Entry<'static> {
 }
 
 /// Every built-in scene, the ball first.
-pub static CATALOGUE: [Entry<'static>; 8] = [
+pub static CATALOGUE: [Entry<'static>; 10] = [
     Entry {
         name: "ball",
         about: "the globe of flat facets: many small polygons, short runs",
@@ -130,8 +171,9 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         background: &BACKGROUND,
         cover: Cover::Painted(|texels| {
             let (texels, _) = texels.split_at_mut(TEXELS);
-            paint_ball(texels.try_into().expect("it was cut to TEXELS"))
+            paint_ball(texels.try_into().expect("it was cut to TEXELS")).into()
         }),
+        mipmaps: false,
         pose: Pose::at_tick,
     },
     Entry {
@@ -140,7 +182,8 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         mesh: SQUARE,
         colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::dial)),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::dial).into()),
+        mipmaps: false,
         pose: |tick| Pose {
             yaw: turn(tick),
             pitch: QUARTER,
@@ -154,7 +197,8 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         mesh: SQUARE,
         colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::board)),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::board).into()),
+        mipmaps: false,
         pose: |tick| Pose {
             yaw: turn(tick).wrapping_add(25 * DEGREE),
             pitch: QUARTER / 2,
@@ -168,7 +212,8 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         mesh: FLOOR_16,
         colours: Colours::BUILT_IN,
         background: &LEVEL_BACKGROUND,
-        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::board)),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::board).into()),
+        mipmaps: false,
         pose: |tick| Pose {
             yaw: 0,
             pitch: 0,
@@ -182,7 +227,8 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         mesh: FLOOR_4096,
         colours: Colours::BUILT_IN,
         background: &LEVEL_BACKGROUND,
-        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::plain)),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::plain).into()),
+        mipmaps: false,
         pose: |tick| Pose {
             yaw: 0,
             pitch: 0,
@@ -196,7 +242,8 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         mesh: WALL,
         colours: Colours::BUILT_IN,
         background: &LEVEL_BACKGROUND,
-        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::bricks)),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::bricks).into()),
+        mipmaps: false,
         pose: |tick| Pose {
             yaw: sway(tick, 12).wrapping_add(52 * DEGREE),
             pitch: 0,
@@ -210,7 +257,8 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         mesh: CUBE,
         colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::crate_side)),
+        cover: Cover::Painted(|texels| surfaces::paint(texels, surfaces::crate_side).into()),
+        mipmaps: false,
         pose: |tick| Pose {
             yaw: turn(tick).wrapping_add(35 * DEGREE),
             pitch: turn(tick / 2).wrapping_add(30 * DEGREE),
@@ -225,13 +273,34 @@ pub static CATALOGUE: [Entry<'static>; 8] = [
         mesh: knot::MESH,
         colours: Colours::BUILT_IN,
         background: &BACKGROUND,
-        cover: Cover::Painted(knot::paint),
+        cover: Cover::Painted(|texels| knot::paint(texels).into()),
+        mipmaps: false,
         pose: |tick| Pose {
             yaw: turn(tick).wrapping_mul(2).wrapping_neg(),
             pitch: (70 * DEGREE).wrapping_add(turn(tick)),
             roll: 20 * DEGREE,
             distance: units(31, 10),
         },
+    },
+    Entry {
+        name: "corridor",
+        about: "a walk between two walls: tiled textures, a mipmap for each distance",
+        mesh: corridor::MESH,
+        colours: Colours::BUILT_IN,
+        background: &LEVEL_BACKGROUND,
+        cover: Cover::Painted(corridor::paint),
+        mipmaps: true,
+        pose: stroll,
+    },
+    Entry {
+        name: "moire",
+        about: "the same walk without mipmaps: what is far away shimmers",
+        mesh: corridor::MESH,
+        colours: Colours::BUILT_IN,
+        background: &LEVEL_BACKGROUND,
+        cover: Cover::Painted(corridor::paint),
+        mipmaps: false,
+        pose: stroll,
     },
 ];
 
@@ -253,6 +322,18 @@ const fn turn(tick: u32) -> u32 {
 fn sway(tick: u32, degrees: u32) -> u32 {
     let sine = sin(turn(tick).wrapping_add(QUARTER / 2));
     ((sine * i64::from(degrees * DEGREE)) >> 30) as u32
+}
+
+/// A tile of the corridor forward in three quarters of a second, and a look to either side: seamless,
+/// since all tiles are alike.
+fn stroll(tick: u32) -> Pose {
+    const TILE: u32 = 45;
+    Pose {
+        yaw: sway(tick, 9),
+        pitch: 0,
+        roll: sway(tick.wrapping_mul(2), 1),
+        distance: units(3, 1) - ((tick % TILE) << 16) as i32 / TILE as i32,
+    }
 }
 
 /// A square that lies `y` below the eye, `half` to either side and as far to the front and back.
@@ -393,7 +474,7 @@ mod tests {
     fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut Stage<'_>)) {
         let entry = Entry::parse(name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
-        let textures = [entry.paint(&mut texels)];
+        let textures = entry.paint(&mut texels);
         let mut storage = Box::new(Storage::new());
         check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
     }
@@ -440,15 +521,16 @@ mod tests {
         let mut texels = Box::new([0; MAX_TEXELS]);
         let mut seen = HashSet::new();
         for entry in &CATALOGUE {
-            let texture = entry.paint(&mut texels);
-            let ramp =
-                |&texel: &u8| usize::from(texel.wrapping_sub(Ramp::Violet.shade(0))) / SHADES;
-            let ramps: HashSet<_> = texture.texels().iter().map(ramp).collect();
-            assert!(ramps.iter().all(|&ramp| ramp < RAMPS), "{}", entry.name);
-            assert!(ramps.len() > 2, "{} is dull", entry.name);
-            seen.insert(texture.texels().to_vec());
+            for texture in entry.paint(&mut texels).iter() {
+                let ramp =
+                    |&texel: &u8| usize::from(texel.wrapping_sub(Ramp::Violet.shade(0))) / SHADES;
+                let ramps: HashSet<_> = texture.texels().iter().map(ramp).collect();
+                assert!(ramps.iter().all(|&ramp| ramp < RAMPS), "{}", entry.name);
+                assert!(ramps.len() > 2, "{} is dull", entry.name);
+                seen.insert(texture.texels().to_vec());
+            }
         }
-        // A floor has the board of the tilted square.
+        // A floor has the board of the tilted square, and the moire the corridor's two.
         assert_eq!(seen.len(), CATALOGUE.len() - 1);
     }
 

@@ -14,6 +14,7 @@ mod camera;
 pub mod catalogue;
 mod clip;
 mod colour;
+mod corridor;
 pub mod font;
 mod knot;
 mod mesh;

@@ -7,7 +7,7 @@ use texmap::plane::Anchor;
 use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex, Visible};
 
 use crate::clip::{Point, place};
-use crate::colour::{LIGHT_LEVELS, LightTable, lit_level};
+use crate::colour::{LIGHT_LEVELS, LightTable, MATERIALS, lit_level};
 use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 
 /// Most vertices of a mesh.
@@ -18,8 +18,10 @@ pub const MAX_FACES: usize = 8192;
 pub const MAX_JOBS: usize = 4096;
 /// Room for a scene's textures, each padded and once per light level: one of the largest.
 pub const SURFACE_BYTES: usize = 3 << 19;
-/// Most textures of a scene.
-const MAX_TEXTURES: usize = 8;
+/// Most textures of a scene, a mipmap counted as one.
+const MAX_TEXTURES: usize = 16;
+/// Textures made of one that has mipmaps: itself, and down to a sixty-fourth of its sides.
+const MIPMAPS: usize = 7;
 
 /// What is seen: a solid, what covers it, and the colours of everything.
 ///
@@ -38,6 +40,9 @@ pub struct Scene<'a, 't> {
     pub light: &'t LightTable,
     /// The colour of each scan line where there is no solid.
     pub background: &'a [u8; HEIGHT],
+    /// Whether the textures need smaller copies for what is far away. Their sides are powers of two
+    /// then, or their tiles'.
+    pub mipmaps: bool,
 }
 
 /// The fixed arenas that drawing works in.
@@ -73,15 +78,43 @@ struct Surface {
     first: usize,
     width: u16,
     height: u16,
+    /// Of a tiled texture.
+    tile: Option<(u16, u16)>,
 }
 
 impl Surface {
     /// The copy of a light level.
     fn lit<'t>(&self, level: usize, texels: &'t [u8; SURFACE_BYTES]) -> Texture<'t> {
         let (width, height) = (self.width, self.height);
-        let len = Texture::padded_len(width, height);
+        let len = self.texels();
         let texels = &texels[self.first + level * len..][..len];
-        Texture::padded(texels, width, height).expect("a lit copy has the sides of its texture")
+        let texture = match self.tile {
+            Some(tile) => Texture::tiled(texels, tile, width, height),
+            None => Texture::padded(texels, width, height),
+        };
+        texture.expect("a lit copy has the sides of its texture")
+    }
+
+    /// Texels of a copy.
+    fn texels(&self) -> usize {
+        let (width, height) = self.sides();
+        Texture::padded_len(width, height)
+    }
+
+    /// How many there are across and down.
+    fn sides(&self) -> (u16, u16) {
+        self.tile.unwrap_or((self.width, self.height))
+    }
+
+    /// The half of each side, one texel at least, and what is half as large.
+    fn halved(self, times: usize) -> Self {
+        let part = |side: u16| (side >> times).max(1);
+        Self {
+            width: part(self.width),
+            height: part(self.height),
+            tile: self.tile.map(|(width, height)| (part(width), part(height))),
+            ..self
+        }
     }
 }
 
@@ -96,6 +129,8 @@ pub struct Stage<'a> {
     mesh: Mesh<'a>,
     palette: &'a Palette,
     background: &'a [u8; HEIGHT],
+    /// Textures made of each of the scene's.
+    mipmaps: usize,
     mapper: Mapper,
     order: Order,
     surfaces: [Surface; MAX_TEXTURES],
@@ -122,6 +157,7 @@ impl<'a> Stage<'a> {
             mesh: scene.mesh,
             palette: scene.palette,
             background: scene.background,
+            mipmaps: 1,
             mapper: Mapper::default(),
             order: Order::default(),
             surfaces: [Surface::default(); MAX_TEXTURES],
@@ -143,11 +179,15 @@ impl<'a> Stage<'a> {
     /// two. If a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further
     /// out than [`MAX_EXTENT`].
     pub fn set(&mut self, scene: Scene<'a, '_>) {
-        assert!(
-            scene.mesh.vertices.len() <= MAX_VERTICES && scene.textures.len() <= MAX_TEXTURES,
-            "the scene has {} vertices and {} textures; the arenas hold {MAX_VERTICES} and {MAX_TEXTURES}",
+        self.mipmaps = if scene.mipmaps { MIPMAPS } else { 1 };
+        let (vertices, textures) = (
             scene.mesh.vertices.len(),
-            scene.textures.len(),
+            scene.textures.len() * self.mipmaps,
+        );
+        assert!(
+            vertices <= MAX_VERTICES && textures <= MAX_TEXTURES,
+            "the scene has {vertices} vertices and {textures} textures; the arenas hold {MAX_VERTICES} \
+             and {MAX_TEXTURES}",
         );
         let faces = scene.mesh.faces.len();
         assert!(
@@ -171,25 +211,42 @@ impl<'a> Stage<'a> {
         }
         let mut free = 0;
         self.surfaces = [Surface::default(); MAX_TEXTURES];
-        for (texture, surface) in scene.textures.iter().zip(&mut self.surfaces) {
-            let (width, height) = (texture.width(), texture.height());
-            let len = Texture::padded_len(width, height);
-            *surface = Surface {
-                first: free,
-                width,
-                height,
+        for (texture, made) in scene
+            .textures
+            .iter()
+            .zip(self.surfaces.chunks_mut(self.mipmaps))
+        {
+            let whole = Surface {
+                first: 0,
+                width: texture.width(),
+                height: texture.height(),
+                tile: texture.tile(),
             };
-            let pitch = usize::from(width).next_power_of_two();
-            for light in scene.light {
+            for (mip, surface) in made.iter_mut().enumerate() {
+                *surface = Surface {
+                    first: free,
+                    ..whole.halved(mip)
+                };
+                let len = surface.texels();
                 let lit = self
                     .texels
-                    .get_mut(free..free + len)
+                    .get_mut(free..free + len * LIGHT_LEVELS)
                     .expect("the scene's textures are larger than the surface arena");
-                free += len;
-                let rows = texture.texels().chunks_exact(texture.pitch().into());
-                for (lit, row) in lit.chunks_exact_mut(pitch).zip(rows) {
-                    for (lit, &texel) in lit.iter_mut().zip(&row[..width.into()]) {
-                        *lit = light[usize::from(texel)];
+                free += lit.len();
+                let (columns, rows) = surface.sides();
+                let pitch = usize::from(columns).next_power_of_two();
+                let block = (whole.sides().0 / columns, whole.sides().1 / rows);
+                for j in 0..rows {
+                    for i in 0..columns {
+                        let texel = match mip {
+                            0 => texture.at(i32::from(i) << 16, i32::from(j) << 16),
+                            _ => mean(texture, (i, j), block, scene.palette),
+                        };
+                        let place = usize::from(j) * pitch + usize::from(i);
+                        let copies = lit.chunks_exact_mut(len);
+                        for (copy, light) in copies.zip(scene.light) {
+                            copy[place] = light[usize::from(texel)];
+                        }
                     }
                 }
             }
@@ -264,23 +321,35 @@ impl<'a> Stage<'a> {
         }
         let visible = &*self.visible;
         let mut renderer = Renderer::new(self.jobs, &surfaces, destination, mapper, order);
-        polygons(&self.mesh, self.points, pose, |number, face| match face {
-            None => renderer.drop_face(),
-            Some(face) if self.mesh.convex => renderer.face(&face),
-            Some(face) => renderer.seen_face(&face, visible, number),
-        });
+        polygons(
+            &self.mesh,
+            self.mipmaps,
+            self.points,
+            pose,
+            |number, face| match face {
+                None => renderer.drop_face(),
+                Some(face) if self.mesh.convex => renderer.face(&face),
+                Some(face) => renderer.seen_face(&face, visible, number),
+            },
+        );
         renderer.finish()
     }
 
     /// Finds out which of the mesh's faces, of at most [`MAX_FACES`], is seen at each pixel.
     pub fn find_visible(&mut self, pose: &Pose) -> &Visible<MAX_FACES> {
         self.visible.clear();
-        polygons(&self.mesh, self.points, pose, |number, face| {
-            if let Some(face) = face {
-                // What is out of range here is so again for the mapper, which counts it.
-                let _ = self.visible.add(number, &face);
-            }
-        });
+        polygons(
+            &self.mesh,
+            self.mipmaps,
+            self.points,
+            pose,
+            |number, face| {
+                if let Some(face) = face {
+                    // What is out of range here is so again for the mapper, which counts it.
+                    let _ = self.visible.add(number, &face);
+                }
+            },
+        );
         self.visible.finish();
         self.visible
     }
@@ -288,13 +357,14 @@ impl<'a> Stage<'a> {
     /// Gives `sink` the faces that look at the viewer, in the mesh's order, each with its number
     /// there; nothing for a face that is dropped.
     pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(u16, Option<Face<'_>>)) {
-        polygons(&self.mesh, self.points, pose, sink);
+        polygons(&self.mesh, self.mipmaps, self.points, pose, sink);
     }
 }
 
 /// The faces that look at the viewer, in the mesh's order, each with its number there.
 fn polygons(
     mesh: &Mesh<'_>,
+    mipmaps: usize,
     points: &mut [Point; MAX_VERTICES],
     pose: &Pose,
     mut sink: impl FnMut(u16, Option<Face<'_>>),
@@ -316,15 +386,22 @@ fn polygons(
             sink(number, None);
             continue;
         };
-        let polygon = &polygon[..sides];
+        let polygon = &mut polygon[..sides];
         if looks_at_viewer(polygon) {
             let level = lit_level(orientation.turn(face.normal));
-            let surface = usize::from(face.texture) * LIGHT_LEVELS + level;
+            let mip = match mipmaps {
+                1 => 0,
+                _ => mipmap(polygon, mipmaps),
+            };
+            for vertex in &mut *polygon {
+                (vertex.u, vertex.v) = (vertex.u >> mip, vertex.v >> mip);
+            }
+            let surface = (usize::from(face.texture) * mipmaps + mip) * LIGHT_LEVELS + level;
             // Far from each other, so that of a face with many corners they are not on a line.
             let anchors = [0, corners.len() / 3, 2 * corners.len() / 3].map(|i| Anchor {
                 position: points[usize::from(corners[i].vertex)].view(),
-                u: corners[i].u,
-                v: corners[i].v,
+                u: corners[i].u >> mip,
+                v: corners[i].v >> mip,
             });
             let face = Face {
                 polygon,
@@ -335,6 +412,50 @@ fn polygons(
             sink(number, Some(face));
         }
     }
+}
+
+/// The colour that comes nearest to the mean of a block of `size` texels, the one in column and row
+/// `place` of such blocks. It is one that light can move.
+fn mean(texture: &Texture<'_>, place: (u16, u16), size: (u16, u16), palette: &Palette) -> u8 {
+    let mut sum = [0; 3];
+    for j in 0..size.1 {
+        for i in 0..size.0 {
+            let [column, row] =
+                [place.0 * size.0 + i, place.1 * size.1 + j].map(|at| i32::from(at) << 16);
+            let colour = palette[usize::from(texture.at(column, row))];
+            for (sum, part) in sum.iter_mut().zip(colour) {
+                *sum += i32::from(part);
+            }
+        }
+    }
+    // At most 2^16 texels of 2^6 each, with 4 fraction bits.
+    let count = i32::from(size.0) * i32::from(size.1);
+    let mean = sum.map(|sum| sum * 16 / count);
+    let distance = |entry: &usize| -> i32 {
+        let off = |k: usize| mean[k] - 16 * i32::from(palette[*entry][k]);
+        (0..3).map(|k| off(k).pow(2)).sum()
+    };
+    MATERIALS.min_by_key(distance).unwrap_or(0) as u8
+}
+
+/// The mipmap, of so many, that a polygon takes: the one of which a pixel along the side that has
+/// most texels to a pixel gets one, within the square root of two.
+///
+/// That is the direction which would show a moire pattern; across it the mipmap is smoother than it
+/// had to be.
+fn mipmap(polygon: &[Vertex], mipmaps: usize) -> usize {
+    let mut mip = 0;
+    for (i, a) in polygon.iter().enumerate() {
+        let b = &polygon[(i + 1) % polygon.len()];
+        // 1/256 texel, below 2^17, and 1/256 pixel, below 2^25. Within a pixel nothing is to be seen.
+        let square = |x: i32, y: i32| i64::from(x).pow(2) + i64::from(y).pow(2);
+        let texels = square((b.u - a.u) >> 8, (b.v - a.v) >> 8);
+        let pixels = square(b.x - a.x, b.y - a.y).max(1 << 16);
+        while mip + 1 < mipmaps && i128::from(texels) > i128::from(pixels) << (2 * mip + 1) {
+            mip += 1;
+        }
+    }
+    mip
 }
 
 /// Whether the snapped polygon is wound clockwise on the screen (y down): its front.

@@ -29,7 +29,7 @@ pub fn shade(ramp: Ramp, shade: i64) -> u8 {
 }
 
 /// So many steps of what runs from 0 to [`ONE`]: 0 to `steps` - 1.
-fn part(value: i64, steps: i64) -> i64 {
+pub fn part(value: i64, steps: i64) -> i64 {
     (value * steps) >> 16
 }
 

@@ -132,7 +132,7 @@ impl<'a, B: Bus> Show<'a, B> {
         let arena = &mut memory.model;
         let scenes = Scenes::new(pack.map(|pack| pack.entry(arena)));
         let state = State::of(scenes, scenes.default());
-        let textures = [state.entry.paint(&mut memory.texels)];
+        let textures = state.entry.paint(&mut memory.texels);
         let stage = Stage::new(&mut memory.storage, state.entry.scene(&textures));
         Self {
             pack: pack.map(Pack::checksum),
@@ -448,7 +448,7 @@ impl<'a, B: Bus> Show<'a, B> {
         self.stage.set_mapper(state.mapper);
         self.stage.set_order(state.order);
         if entry.name != self.state.entry.name {
-            let textures = [entry.paint(self.texels)];
+            let textures = entry.paint(self.texels);
             self.stage.set(entry.scene(&textures));
             self.offscreen.forget();
             self.overlay.set_palette(self.stage.palette());

@@ -120,7 +120,7 @@ impl Job {
     }
 
     /// Whether the run keeps to one column.
-    pub(crate) fn is_column(&self) -> bool {
+    pub fn is_column(&self) -> bool {
         self.axis == Axis::Down && !matches!(self.walk, Walk::Free(_))
     }
 

@@ -184,6 +184,7 @@ impl Solid {
             palette: &PALETTE,
             light: &LIGHT,
             background: &BACKGROUND,
+            mipmaps: false,
         };
         act(&mut Stage::new(storage, scene))
     }

@@ -3,9 +3,8 @@
 use core::ops::Range;
 
 use modex::{Destination, HEIGHT};
-use texmap::coverage::Axis;
+use texmap::Job;
 use texmap::plane::coordinate;
-use texmap::{Job, Walk};
 
 use super::{LIGHT_LEVELS, Stage, polygons};
 use crate::Pose;
@@ -28,47 +27,49 @@ impl Stage<'_> {
         }
         let visible = &*self.visible;
         let mut most = 0;
-        polygons(&self.mesh, self.points, pose, |face_number, face| {
-            let Some(face) = face else { return };
-            let number = usize::from(face.texture);
-            let texture =
-                self.surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, self.texels);
-            let plane = face.plane();
-            let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
-                let c = plane.c.at(x, y);
-                let off = |found: i32, form: texmap::plane::Form, size: u16| {
-                    found.abs_diff(coordinate(form.at(x, y), c, size))
+        polygons(
+            &self.mesh,
+            self.mipmaps,
+            self.points,
+            pose,
+            |face_number, face| {
+                let Some(face) = face else { return };
+                let number = usize::from(face.texture);
+                let texture =
+                    self.surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, self.texels);
+                let plane = face.plane();
+                let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
+                    let c = plane.c.at(x, y);
+                    let off = |found: i32, form: texmap::plane::Form, size: u16| {
+                        found.abs_diff(coordinate(form.at(x, y), c, size))
+                    };
+                    off(u, plane.a, texture.width()).max(off(v, plane.b, texture.height()))
                 };
-                off(u, plane.a, texture.width()).max(off(v, plane.b, texture.height()))
-            };
-            let mut draw = |job: Job| {
-                if keeps_to_its_column(&job) && !columns.contains(&job.x) {
-                    return;
-                }
-                let mut run = Run::new();
-                job.pixels(&texture, |place, coordinates| {
-                    let error = error(place, coordinates);
-                    if columns.contains(&place.0) {
-                        most = most.max(error);
+                let mut draw = |job: Job| {
+                    if job.is_column() && !columns.contains(&job.x) {
+                        return;
                     }
-                    run.push(place, colour(error), destination);
-                });
-                run.draw(destination);
-            };
-            // What is outside the legal range is not drawn otherwise, either.
-            let _ = self
-                .mapper
-                .jobs(&face, &texture, |job| match self.mesh.convex {
-                    true => draw(job),
-                    false => visible.cut(face_number, &job, &mut draw),
-                });
-        });
+                    let mut run = Run::new();
+                    job.pixels(&texture, |place, coordinates| {
+                        let error = error(place, coordinates);
+                        if columns.contains(&place.0) {
+                            most = most.max(error);
+                        }
+                        run.push(place, colour(error), destination);
+                    });
+                    run.draw(destination);
+                };
+                // What is outside the legal range is not drawn otherwise, either.
+                let _ = self
+                    .mapper
+                    .jobs(&face, &texture, |job| match self.mesh.convex {
+                        true => draw(job),
+                        false => visible.cut(face_number, &job, &mut draw),
+                    });
+            },
+        );
         most
     }
-}
-
-fn keeps_to_its_column(job: &Job) -> bool {
-    job.axis == Axis::Down && !matches!(job.walk, Walk::Free(_))
 }
 
 /// Pixels below each other that are not drawn yet.
@@ -123,7 +124,7 @@ mod tests {
     fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut Stage<'_>)) {
         let entry = CATALOGUE.iter().find(|entry| entry.name == name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
-        let textures = [entry.paint(&mut texels)];
+        let textures = entry.paint(&mut texels);
         let mut storage = Box::new(Storage::new());
         check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
     }

@@ -1,0 +1,119 @@
+//! The moire pattern of the corridor, measured: how much it shimmers, with mipmaps and without.
+//!
+//! A pixel ought to show the mean of what it covers: here that of 8 x 8 places in it, in the textures
+//! as they are, by the planes' quotients. What a picture is off by changes from one picture to the next
+//! where texels are left out, now these and now those; that change is what is seen to crawl. Its mean
+//! square is the energy. What stays, as the hue of a mean that the palette does not have, is no part
+//! of it.
+
+use modex::{HEIGHT, PlanarBuffer, WIDTH};
+use oracle::depth::nearest;
+use scene::catalogue::{Entry, MAX_TEXELS};
+use scene::{Pose, Stage, Storage};
+use texmap::plane::Form;
+use texmap::{Mapper, Plane};
+
+/// Places across a pixel, and down.
+const PLACES: i64 = 8;
+
+/// Calls `look` with a scene's stage.
+fn on_stage<T>(name: &str, look: impl FnOnce(&Entry<'_>, &mut Stage<'_>) -> T) -> T {
+    let entry = Entry::parse(name).unwrap();
+    let mut texels = Box::new([0; MAX_TEXELS]);
+    let textures = entry.paint(&mut texels);
+    let mut storage = Box::new(Storage::new());
+    look(entry, &mut Stage::new(&mut storage, entry.scene(&textures)))
+}
+
+/// What each pixel that covers more than two texels shows in the mean of its places, red, green and blue,
+/// 0 to 63. Of others hardly a texel is left out.
+fn means(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
+    let seen = nearest(stage, pose);
+    let mut faces = Vec::new();
+    stage.polygons(pose, |number, face| {
+        let face = face.unwrap();
+        faces.push((number, face.plane(), face.texture));
+    });
+    let (palette, mut means) = (*stage.palette(), vec![None; WIDTH * HEIGHT]);
+    for (number, Plane { a, b, c }, surface) in faces {
+        let texture = stage.surface(surface);
+        let (last_u, last_v) = texture.last();
+        for (i, mean) in means.iter_mut().enumerate() {
+            if seen[i].first() != Some(&number) {
+                continue;
+            }
+            let (x, y) = ((i % WIDTH) as u16, (i / WIDTH) as u16);
+            let at = |form: &Form, i: i64, j: i64| {
+                let aside = form.right * (2 * i + 1 - PLACES) + form.down * (2 * j + 1 - PLACES);
+                (form.at(x, y) + aside / (2 * PLACES)) as f64
+            };
+            let wide = |form: &Form| {
+                let at = |i, j| at(form, i, j) / at(&c, i, j);
+                let change = at(PLACES, 0) - at(0, 0);
+                change.abs().max((at(0, PLACES) - at(0, 0)).abs()) > 2.0
+            };
+            if !wide(&a) && !wide(&b) {
+                continue;
+            }
+            let mut sum = [0.0; 3];
+            for (i, j) in (0..PLACES).flat_map(|j| (0..PLACES).map(move |i| (i, j))) {
+                let c = at(&c, i, j);
+                let coordinate = |form: &Form, last: i32| {
+                    let texels = at(form, i, j) / c * 65536.0;
+                    texels.clamp(0.0, f64::from(last)) as i32
+                };
+                let texel = texture.at(coordinate(&a, last_u), coordinate(&b, last_v));
+                for (sum, part) in sum.iter_mut().zip(palette[usize::from(texel)]) {
+                    *sum += f64::from(part);
+                }
+            }
+            *mean = Some(sum.map(|sum| sum / (PLACES * PLACES) as f64));
+        }
+    }
+    means
+}
+
+/// What each covered pixel's colour is off.
+fn errors(stage: &mut Stage<'_>, pose: &Pose, means: &[Option<[f64; 3]>]) -> Vec<Option<[f64; 3]>> {
+    let mut page = PlanarBuffer::new();
+    stage.set_mapper(Mapper::Exact);
+    stage.draw(pose, &mut page);
+    let error = |(i, mean): (usize, &Option<[f64; 3]>)| {
+        let colour = stage.palette()[usize::from(page.pixel(i % WIDTH, i / WIDTH))];
+        mean.map(|mean| [0, 1, 2].map(|k| f64::from(colour[k]) - mean[k]))
+    };
+    means.iter().enumerate().map(error).collect()
+}
+
+#[test]
+fn mipmaps_take_half_of_the_shimmer_away() {
+    let pairs = [0, 130, 300, 555].map(|tick| [tick, tick + 1]);
+    let pose = |tick: u32| Entry::parse("corridor").unwrap().pose(tick);
+    let truth = on_stage("moire", |_, stage| {
+        pairs.map(|pair| pair.map(|tick| means(stage, &pose(tick))))
+    });
+    let energies = |name| {
+        on_stage(name, |_, stage| {
+            let mut energies = Vec::new();
+            for (pair, means) in pairs.iter().zip(&truth) {
+                let [a, b] = [0, 1].map(|i| errors(stage, &pose(pair[i]), &means[i]));
+                let both = a.iter().zip(&b).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
+                let squares: Vec<f64> = both
+                    .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>() / 3.0)
+                    .collect();
+                energies.push(squares.iter().sum::<f64>() / squares.len() as f64);
+            }
+            energies
+        })
+    };
+    let (before, after) = (energies("moire"), energies("corridor"));
+    for ((pair, before), after) in pairs.iter().zip(&before).zip(&after) {
+        println!(
+            "frames {} and {}: {before:.2} without mipmaps, {after:.2} with them: {:.1} times",
+            pair[0],
+            pair[1],
+            before / after
+        );
+        assert!(after * 3.0 < before * 2.0, "{after} of {before}");
+    }
+}
