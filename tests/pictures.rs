@@ -65,7 +65,10 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
             (u.texels(AFFINE_BITS, width), v.texels(AFFINE_BITS, height))
         }
     };
-    let texel = |i, j: u16| {
+    // A tiled texture has the texels of its tile alone.
+    let (across, down) = texture.tile().unwrap_or((width, height));
+    let texel = |i: u16, j: u16| {
+        let (i, j) = (i % across, j % down);
         texture.texels()[usize::from(j) * usize::from(texture.pitch()) + usize::from(i)]
     };
     rows.flat_map(|j| columns.clone().map(move |i| (i, j)))

@@ -78,7 +78,7 @@ const fn build() -> Solid {
     while segment < SEGMENTS {
         let tiles = STATIONS[segment + 1] - STATIONS[segment];
         assert!(tiles <= LONGEST);
-        let (along, two) = (tiles * (TILE as i32) << 16, 2 * (TILE as i32) << 16);
+        let (along, two) = ((tiles * (TILE as i32)) << 16, (2 * TILE as i32) << 16);
         let (near, far) = (4 * segment as u16, 4 * segment as u16 + 4);
         // Clockwise as they are seen from between them, with their places in the texture.
         let faces = [
