@@ -9,7 +9,7 @@
 use anyhow::{Context, anyhow, bail};
 use emulator::Vga;
 use link::dump::{Header, PLANE_BYTES};
-use link::{Command, Content, ERROR, OK, Picture, Setting, Word};
+use link::{Command, Content, ERROR, OK, Picture, Word};
 use pack::Pack;
 use scene::catalogue::Entry;
 use show::{Memory, Show};
@@ -69,11 +69,6 @@ pub struct Emulated<'a> {
     show: Show<'a, Vga>,
     /// The checksum of the pack with the model.
     pack: Option<u32>,
-    scene: String,
-    /// The mapper that is set, and the one that drew the picture.
-    mapper: Option<Word>,
-    drawn_by: Option<Word>,
-    picture: Option<Picture>,
 }
 
 impl<'a> Emulated<'a> {
@@ -93,22 +88,9 @@ impl<'a> Emulated<'a> {
         let mut this = Self {
             show: Show::new(memory, Vga::new(), pack),
             pack: pack.map(Pack::checksum),
-            scene: String::new(),
-            mapper: None,
-            drawn_by: None,
-            picture: None,
         };
         this.ask(Command::Hold)?;
         Ok(this)
-    }
-
-    /// What the program says of its state in the line that begins with `what`.
-    fn state(&mut self, what: &str) -> anyhow::Result<String> {
-        let state = self.ask(Command::State)?;
-        let said = state
-            .iter()
-            .find_map(|line| line.strip_prefix(what)?.strip_prefix(' '));
-        Ok(said.unwrap_or_default().to_string())
     }
 
     /// The card itself.
@@ -132,33 +114,7 @@ impl Card for Emulated<'_> {
             bail!("the emulated card has no machine that could '{request:?}'");
         }
         match answer.pop() {
-            Some(last) if last == format!("{OK} {command}") => {
-                match command {
-                    Command::Hold => {
-                        self.picture = None;
-                        self.scene = self.state("scene")?;
-                        self.mapper = Word::new(&self.state("mapper")?);
-                        self.drawn_by = self.drawn_by.or(self.mapper);
-                    }
-                    Command::Set(Setting::Mapper, Some(name)) => self.mapper = Some(name),
-                    Command::Set(Setting::Scene, Some(name)) => {
-                        self.picture = None;
-                        self.scene = name.to_string();
-                    }
-                    Command::Show(picture) => {
-                        self.picture = Some(picture);
-                        self.drawn_by = self.mapper;
-                    }
-                    Command::ShowAt(_) => {
-                        self.picture = Picture::parse(self.state("picture")?.split(' '));
-                        self.scene = self.state("scene")?;
-                        self.mapper = Word::new(&self.state("mapper")?);
-                        self.drawn_by = self.mapper;
-                    }
-                    _ => {}
-                }
-                Ok(answer)
-            }
+            Some(last) if last == format!("{OK} {command}") => Ok(answer),
             Some(error) => {
                 let error = error.strip_prefix(ERROR).unwrap_or(&error);
                 Err(anyhow!("'{command}' is refused:{error}"))
@@ -168,6 +124,14 @@ impl Card for Emulated<'_> {
     }
 
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
+        // What it is the picture of is all that the program is asked for.
+        let state = self.ask(Command::State)?;
+        let said = |what| {
+            let mut lines = state.iter();
+            let said = lines.find_map(|line| line.strip_prefix(what)?.strip_prefix(' '));
+            said.with_context(|| format!("the state has no line '{what}'"))
+        };
+        let scene = said("scene")?;
         let vga = self.show.bus();
         let page = vga.page().map_err(|fault| anyhow!("{fault}"))?;
         let pixels = match content {
@@ -179,10 +143,10 @@ impl Card for Emulated<'_> {
         Ok(Dump {
             header: Header {
                 content,
-                scene: self.scene.clone(),
-                pack: self.pack.filter(|_| self.scene == Entry::LOADED),
-                mapper: self.drawn_by.context("the show was never held")?,
-                picture: self.picture,
+                scene: scene.into(),
+                pack: self.pack.filter(|_| scene == Entry::LOADED),
+                mapper: Word::new(said("drawn")?).context("a mapper's name is a word")?,
+                picture: Picture::parse(said("picture")?.split(' ')),
                 start: page.start,
                 width: page.width.try_into()?,
                 height: page.height.try_into()?,

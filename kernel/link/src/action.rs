@@ -46,6 +46,8 @@ pub enum Action {
     Coarser,
     /// `next-order`
     NextOrder,
+    /// `quality`: lower while it moves, where motion hides it, or no more.
+    Quality,
     /// `help`: the keys, written over the picture, or no more.
     Help,
     /// `info`: figures of the pictures, written over them, or no more.
@@ -60,7 +62,7 @@ pub enum Action {
 
 impl Action {
     /// Every action with its name on the line.
-    pub const ALL: [(&'static str, Self); 24] = [
+    pub const ALL: [(&'static str, Self); 25] = [
         ("yaw-left", Self::YawLeft),
         ("yaw-right", Self::YawRight),
         ("pitch-up", Self::PitchUp),
@@ -80,6 +82,7 @@ impl Action {
         ("finer", Self::Finer),
         ("coarser", Self::Coarser),
         ("next-order", Self::NextOrder),
+        ("quality", Self::Quality),
         ("help", Self::Help),
         ("info", Self::Info),
         ("split", Self::Split),

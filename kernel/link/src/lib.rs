@@ -31,7 +31,7 @@
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
 //! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
-//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `page 1 start 4b00` |
+//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `drawn shifts` (`exact~` if faces that move were drawn in lower quality), `page 1 start 4b00` |
 //! | `version` | `crystal-ball 0.1.0 protocol 5 dump 3` |
 //! | `fail KIND` | none: the kernel breaks in the way that is named ([`Fault`]) |
 //! | `leave` | after the `ok` QEMU ends |

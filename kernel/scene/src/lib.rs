@@ -30,4 +30,5 @@ pub use camera::{FOCAL_LENGTH, NEAR};
 pub use colour::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable, MATERIALS};
 pub use mesh::{Corner, Face, MAX_CORNERS, MAX_EXTENT, Mesh, Vec3};
 pub use pose::{Orientation, Pose};
+pub use stage::motion;
 pub use stage::{MAX_FACES, MAX_JOBS, MAX_VERTICES, SURFACE_BYTES, Scene, Stage, Storage};

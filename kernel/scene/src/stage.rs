@@ -1,11 +1,13 @@
 //! A scene made ready, and the way from a pose to polygons.
 
 mod errors;
+pub mod motion;
 
 use modex::{Destination, HEIGHT, Palette};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex, Visible};
 
+use self::motion::Quality;
 use crate::clip::{Point, place};
 use crate::colour::{LIGHT_LEVELS, LightTable, MATERIALS, lit_level};
 use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
@@ -133,6 +135,12 @@ pub struct Stage<'a> {
     mipmaps: usize,
     mapper: Mapper,
     order: Order,
+    /// The pose a tick later, where quality is lower while the solid moves, and faces of the last
+    /// picture that were drawn so.
+    next: Option<Pose>,
+    lowered: u32,
+    /// Half the shortest period of the textures, 16.16 texels.
+    half_period: Option<u32>,
     surfaces: [Surface; MAX_TEXTURES],
     texels: &'a mut [u8; SURFACE_BYTES],
     points: &'a mut [Point; MAX_VERTICES],
@@ -160,6 +168,9 @@ impl<'a> Stage<'a> {
             mipmaps: 1,
             mapper: Mapper::default(),
             order: Order::default(),
+            next: None,
+            lowered: 0,
+            half_period: None,
             surfaces: [Surface::default(); MAX_TEXTURES],
             texels: surfaces,
             points,
@@ -251,6 +262,10 @@ impl<'a> Stage<'a> {
                 }
             }
         }
+        let periods = scene.textures.iter();
+        self.half_period = periods
+            .filter_map(|texture| motion::half_period(texture, scene.palette))
+            .min();
         self.name = scene.name;
         self.mesh = scene.mesh;
         self.palette = scene.palette;
@@ -279,8 +294,7 @@ impl<'a> Stage<'a> {
 
     /// A texture in the light of a face, by the number that [`Face`] has.
     pub fn surface(&self, number: u16) -> Texture<'_> {
-        let number = usize::from(number);
-        self.surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, self.texels)
+        lit(&self.surfaces, self.texels, number)
     }
 
     /// How pictures are mapped.
@@ -303,6 +317,18 @@ impl<'a> Stage<'a> {
         self.order = order;
     }
 
+    /// Has the next pictures drawn in lower quality where their motion hides it, until this is called
+    /// again: `next` is the pose that comes a tick after the one that is drawn. Returns what was set
+    /// before.
+    pub fn lower_for(&mut self, next: Option<Pose>) -> Option<Pose> {
+        core::mem::replace(&mut self.next, next)
+    }
+
+    /// Faces of the last picture that were drawn in lower quality.
+    pub fn lowered(&self) -> u32 {
+        self.lowered
+    }
+
     /// Draws the solid in `pose` on a destination that holds the background. At a distance outside
     /// 0 to [`Pose::MAX_DISTANCE`] every face is dropped; at any other none is.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
@@ -320,6 +346,8 @@ impl<'a> Stage<'a> {
             }
         }
         let visible = &*self.visible;
+        let quality = Quality::of(mapper, pose, self.next.as_ref());
+        let mut lowered = 0;
         let mut renderer = Renderer::new(self.jobs, &surfaces, destination, mapper, order);
         polygons(
             &self.mesh,
@@ -328,11 +356,20 @@ impl<'a> Stage<'a> {
             pose,
             |number, face| match face {
                 None => renderer.drop_face(),
-                Some(face) if self.mesh.convex => renderer.face(&face),
-                Some(face) => renderer.seen_face(&face, visible, number),
+                Some(face) => {
+                    let chosen = quality.mapper(&face);
+                    lowered += u32::from(chosen != mapper);
+                    renderer.set_mapper(chosen);
+                    match self.mesh.convex {
+                        true => renderer.face(&face),
+                        false => renderer.seen_face(&face, visible, number),
+                    }
+                }
             },
         );
-        renderer.finish()
+        let stats = renderer.finish();
+        self.lowered = lowered;
+        stats
     }
 
     /// Finds out which of the mesh's faces, of at most [`MAX_FACES`], is seen at each pixel.
@@ -359,6 +396,16 @@ impl<'a> Stage<'a> {
     pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(u16, Option<Face<'_>>)) {
         polygons(&self.mesh, self.mipmaps, self.points, pose, sink);
     }
+}
+
+/// A texture in the light of a face.
+fn lit<'t>(
+    surfaces: &[Surface; MAX_TEXTURES],
+    texels: &'t [u8; SURFACE_BYTES],
+    number: u16,
+) -> Texture<'t> {
+    let number = usize::from(number);
+    surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, texels)
 }
 
 /// The faces that look at the viewer, in the mesh's order, each with its number there.

@@ -107,6 +107,12 @@ pub const KEYS: &[Key] = &[
         "next order: polygons, planes, buffer",
     ),
     key(
+        "L",
+        [KeyCode::L; 2],
+        Action::Quality,
+        "lower quality while it moves",
+    ),
+    key(
         "H",
         [KeyCode::H, KeyCode::F1],
         Action::Help,

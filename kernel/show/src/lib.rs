@@ -40,6 +40,10 @@ use steering::{Log, NotNoted, Notes, Scenes, State};
 /// The program's version, as its first line and `version` tell it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
+/// What a mapper's name ends in where some faces were drawn in lower quality, since they moved. Such a
+/// picture is named by its log and tick: its pose does not tell which faces.
+const LOWERED: &str = "~";
+
 /// Where an answer's lines go, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
@@ -114,7 +118,7 @@ pub struct Show<'a, B> {
     lines: Lines,
     /// The last picture, by which mapper it was drawn, and what it took.
     picture: Option<Picture>,
-    mapper: Mapper,
+    drawn_by: Option<Word>,
     drawn: Stats,
     /// The largest error of the last picture, if it was split.
     most: u32,
@@ -147,7 +151,7 @@ impl<'a, B: Bus> Show<'a, B> {
             offscreen: &mut memory.offscreen,
             lines: Lines::new(),
             picture: None,
-            mapper: Mapper::default(),
+            drawn_by: Word::of(Mapper::default()),
             drawn: Stats::default(),
             most: 0,
             pace: Some(Pace::default()),
@@ -241,6 +245,7 @@ impl<'a, B: Bus> Show<'a, B> {
                 if self.pace.is_some() {
                     self.hold();
                 }
+                self.stage.lower_for(None);
                 self.draw(picture, &pose, false);
                 self.tell_page(out);
             }
@@ -325,7 +330,12 @@ impl<'a, B: Bus> Show<'a, B> {
         };
         self.card.flip();
         self.picture = Some(picture);
-        self.mapper = self.stage.mapper();
+        let mark = if self.stage.lowered() > 0 {
+            LOWERED
+        } else {
+            ""
+        };
+        self.drawn_by = Word::of(format_args!("{}{mark}", self.stage.mapper()));
     }
 
     /// Draws the picture of a tick on the next page, and flips.
@@ -337,6 +347,9 @@ impl<'a, B: Bus> Show<'a, B> {
         } else {
             name(&pose)
         };
+        let next = tick.wrapping_add(1);
+        self.stage
+            .lower_for(self.state.lower.then(|| self.state.pose(next)));
         let overlay = self.pace.is_some() && self.prepare_overlay(tick);
         self.draw(picture, &pose, overlay);
     }
@@ -344,16 +357,20 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Whether there is an overlay for the picture of a tick; if so it is ready.
     fn prepare_overlay(&mut self, tick: u32) -> bool {
         let counts = self.card.bus().counts();
+        let (stage, state) = (&mut self.stage, &self.state);
         let figures = Figures {
             scene: self.state.entry.name,
             mapper: self.state.mapper,
             order: self.state.order,
             paused: self.state.is_paused(),
+            lowered: state.lower.then(|| stage.lowered()),
             pixels: self.drawn.pixels,
             most: self.most,
             map_masks: counts.draw.map_mask + counts.erase.map_mask,
         };
-        self.overlay.prepare(tick, &figures)
+        self.overlay.prepare(tick, &figures, || {
+            stage.motion(&state.pose(tick), &state.pose(tick.wrapping_add(1)))
+        })
     }
 
     /// Changes the running show at the first tick that has no picture yet, and notes it.
@@ -505,7 +522,7 @@ impl<'a, B: Bus> Show<'a, B> {
             content,
             scene: self.stage.name(),
             pack: self.pack.filter(|_| self.stage.name() == Entry::LOADED),
-            mapper: Word::of(self.mapper).expect("a mapper's name is a word"),
+            mapper: self.drawn_by.expect("a mapper's name is a word"),
             picture: self.picture,
             start: self.card.start_address(),
             width: WIDTH as u16,
@@ -584,6 +601,9 @@ impl<'a, B: Bus> Show<'a, B> {
         match self.picture {
             Some(picture) => out(format_args!("picture {picture}")),
             None => out(format_args!("picture none")),
+        }
+        if let Some(mapper) = self.drawn_by {
+            out(format_args!("drawn {mapper}"));
         }
         out(format_args!(
             "page {} start {:04x}",

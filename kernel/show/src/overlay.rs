@@ -14,11 +14,14 @@ use core::fmt::{self, Write};
 use link::Action;
 use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH};
 use scene::font;
+use scene::motion::Motion;
 use texmap::{Mapper, Order};
 
 use crate::KEYS;
 use crate::split::{self, Split};
 
+/// A tick is a sixtieth of a second.
+const TICKS_A_SECOND: u32 = 60;
 /// Ticks between one writing of the figures and the next.
 const RENEWAL: u32 = 30;
 /// Ticks that a hint stays.
@@ -229,6 +232,8 @@ pub(crate) struct Figures {
     pub mapper: Mapper,
     pub order: Order,
     pub paused: bool,
+    /// Faces of the last picture in lower quality, if quality is lower where motion hides it.
+    pub lowered: Option<u32>,
     /// Of the last picture.
     pub pixels: u32,
     /// Of the last picture, its overlay aside.
@@ -318,8 +323,14 @@ impl<'a> Overlay<'a> {
         self.window.micros += u64::from(micros);
     }
 
-    /// Whether there is anything to draw over the picture of `tick`; if so it is written.
-    pub fn prepare(&mut self, tick: u32, figures: &Figures) -> bool {
+    /// Whether there is anything to draw over the picture of `tick`; if so it is written. `motion`
+    /// finds out how what is seen moves in a tick.
+    pub fn prepare(
+        &mut self,
+        tick: u32,
+        figures: &Figures,
+        motion: impl FnOnce() -> Option<Motion>,
+    ) -> bool {
         let ticks = tick.wrapping_sub(self.window.since);
         if ticks >= RENEWAL {
             let Window {
@@ -327,7 +338,7 @@ impl<'a> Overlay<'a> {
             } = self.window;
             // Not of pictures that were not shown: the show may just have begun.
             if pictures > 0 && ticks < 100 * RENEWAL {
-                let tenths = pictures * 600 / ticks;
+                let tenths = pictures * 10 * TICKS_A_SECOND / ticks;
                 self.pace = Some((tenths, (micros / u64::from(pictures)) as u32));
             }
             self.window = Window {
@@ -353,7 +364,7 @@ impl<'a> Overlay<'a> {
                     self.write_labels(figures);
                 }
                 if self.info {
-                    self.write_info(figures);
+                    self.write_info(figures, motion());
                 }
                 if self.hint.is_some() && !self.split {
                     let text = "H: help";
@@ -394,14 +405,8 @@ impl<'a> Overlay<'a> {
         let [left, middle, right] = split::WINDOWS.map(|x| x + MARGIN);
         write(Ink::Bright, left, y, format_args!("{mapper}"));
         write(Ink::Bright, middle, y, format_args!("exact"));
-        let hundredths = (u64::from(*most) * 100) >> 16;
-        let (whole, part) = (hundredths / 100, hundredths % 100);
-        write(
-            Ink::Bright,
-            right,
-            y,
-            format_args!("most {whole}.{part:02} texel"),
-        );
+        let most = Hundredths(*most);
+        write(Ink::Bright, right, y, format_args!("most {most} texel"));
         let y = split::LEGEND_Y + split::LEGEND_LINES + 3;
         for (step, text) in [(1, "1/256"), (split::TEXEL, "1"), (split::STEPS - 1, "64")] {
             let begins = split::LEGEND_X + step * split::LEGEND_STEP;
@@ -411,7 +416,7 @@ impl<'a> Overlay<'a> {
         }
     }
 
-    fn write_info(&mut self, figures: &Figures) {
+    fn write_info(&mut self, figures: &Figures, motion: Option<Motion>) {
         let Figures {
             scene,
             mapper,
@@ -419,6 +424,7 @@ impl<'a> Overlay<'a> {
             paused,
             pixels,
             map_masks,
+            lowered,
             ..
         } = figures;
         let (pace, writing) = (self.pace, &mut *self.writing);
@@ -446,9 +452,49 @@ impl<'a> Overlay<'a> {
         if let Mapper::Within(tolerance) = mapper {
             line(Ink::Plain, format_args!("at most {tolerance} texel off"));
         }
+        if let Some((pixels, sweet_spot)) = moved(motion, pace) {
+            line(
+                Ink::Plain,
+                format_args!("{} pixels a frame", Hundredths(pixels)),
+            );
+            if let Some((least, most)) = sweet_spot {
+                let (ink, verdict) = match pixels {
+                    0 => (Ink::Plain, ""),
+                    _ if pixels < least => (Ink::Plain, ": too slow"),
+                    _ if pixels > most => (Ink::Plain, ": too fast"),
+                    _ => (Ink::Bright, ""),
+                };
+                let (least, most) = (Hundredths(least), Hundredths(most));
+                line(ink, format_args!("sweet spot {least} to {most}{verdict}"));
+            }
+        }
+        if let Some(faces) = lowered {
+            line(Ink::Plain, format_args!("lower quality: {faces} faces"));
+        }
         if *paused {
             line(Ink::Bright, format_args!("paused"));
         }
+    }
+}
+
+/// How far what is seen moves from picture to picture, in pixels, and from where to where the eye
+/// joins that into motion. Nothing if it is not known how fast pictures come.
+fn moved(motion: Option<Motion>, pace: Option<(u32, u32)>) -> Option<(u32, Option<(u32, u32)>)> {
+    let (motion, (tenths, _)) = motion.zip(pace)?;
+    // Ticks a picture, 16.16.
+    let ticks = ((10 * TICKS_A_SECOND) << 16).checked_div(tenths)?;
+    let pixels = (u64::from(motion.pixels) * u64::from(ticks)) >> 16;
+    let pixels = u32::try_from(pixels).unwrap_or(u32::MAX);
+    Some((pixels, motion.sweet_spot(ticks, TICKS_A_SECOND)))
+}
+
+/// A number with 16 fraction bits, cut to hundredths.
+struct Hundredths(u32);
+
+impl fmt::Display for Hundredths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let hundredths = (u64::from(self.0) * 100) >> 16;
+        write!(f, "{}.{:02}", hundredths / 100, hundredths % 100)
     }
 }
 

@@ -75,14 +75,15 @@ impl Split {
         destination: &mut impl Destination,
     ) -> (Stats, u32) {
         let [left, middle, right] = WINDOWS.map(|x| x as u16);
-        let stats = stage.draw(pose, &mut Window::new(destination, COLUMNS, left));
-        let colour = |error| self.heat[step(error)];
-        let mut window = Window::new(destination, COLUMNS, right);
-        let most = stage.draw_errors(pose, COLUMNS, colour, &mut window);
-        let mapper = stage.mapper();
+        let (mapper, lower) = (stage.mapper(), stage.lower_for(None));
         stage.set_mapper(Mapper::Exact);
         stage.draw(pose, &mut Window::new(destination, COLUMNS, middle));
         stage.set_mapper(mapper);
+        stage.lower_for(lower);
+        let colour = |error| self.heat[step(error)];
+        let mut window = Window::new(destination, COLUMNS, right);
+        let most = stage.draw_errors(pose, COLUMNS, colour, &mut window);
+        let stats = stage.draw(pose, &mut Window::new(destination, COLUMNS, left));
         (stats, most)
     }
 

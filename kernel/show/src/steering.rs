@@ -221,6 +221,8 @@ pub(crate) struct State<'a> {
     pub mapper: Mapper,
     /// In which order runs are drawn.
     pub order: Order,
+    /// Whether quality is lower where motion hides it.
+    pub lower: bool,
     motion: Motion,
 }
 
@@ -236,6 +238,7 @@ impl<'a> State<'a> {
             entry,
             mapper: Mapper::default(),
             order: Order::default(),
+            lower: false,
             motion: Motion::OWN,
         }
     }
@@ -277,7 +280,7 @@ impl<'a> State<'a> {
 
     fn differs(&self, other: &Self, tick: u32) -> bool {
         self.entry.name != other.entry.name
-            || (self.mapper, self.order) != (other.mapper, other.order)
+            || (self.mapper, self.order, self.lower) != (other.mapper, other.order, other.lower)
             || self.motion.at(tick) != other.motion.at(tick)
     }
 
@@ -316,6 +319,7 @@ impl<'a> State<'a> {
                 let next = here.map_or(0, |here| (here + 1) % Order::ALL.len());
                 self.order = Order::ALL[next].1;
             }
+            Action::Quality => self.lower = !self.lower,
             Action::Reset => *self = Self::of(self.scenes, entry),
             Action::Help | Action::Info | Action::Split | Action::Hint => {}
         }
@@ -543,6 +547,7 @@ mod tests {
                     | Action::NextMapper
                     | Action::LastMapper
                     | Action::NextOrder
+                    | Action::Quality
             );
             for tick in 0..3000 {
                 let changed = act(&mut state, tick, action);

@@ -30,8 +30,9 @@ fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {
     let (_, crc) = evidence[0].split_once(" crc ").unwrap();
     evidence[0] = crc.to_string();
     let state = done(show, "state", tick);
-    let named =
-        |line: &&String| ["scene", "mapper", "picture"].contains(&line.split(' ').next().unwrap());
+    let named = |line: &&String| {
+        ["scene", "mapper", "picture", "drawn"].contains(&line.split(' ').next().unwrap())
+    };
     evidence.extend(state.iter().filter(named).cloned());
     evidence
 }
@@ -203,6 +204,17 @@ fn a_full_log_is_told_and_steers_on() {
     done(&mut show, "show at 1028", 1028);
 }
 
+/// The table of the README is the key map.
+#[test]
+fn the_readme_has_every_key() {
+    let readme = include_str!("../../../README.md");
+    let rows = KEYS
+        .iter()
+        .map(|key| format!("| {} | `{}` | {} |\n", key.name, key.action, key.about));
+    let table: String = rows.collect();
+    assert!(readme.contains(&table), "the README should have\n{table}");
+}
+
 #[test]
 fn keys_are_listed_with_what_they_do() {
     let mut memory = Box::new(Memory::new());
@@ -341,4 +353,54 @@ fn a_split_view_shows_the_same_part_three_times() {
             assert_eq!(pixels(&mut show)[0], sky);
         }
     }
+}
+
+/// Lower while it moves, and as it was when it stands; in the log's pictures as in the show's own.
+#[test]
+fn quality_is_lower_while_it_moves_and_only_then() {
+    let mut memory = Box::new(Memory::new());
+    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let drawn = |evidence: &[String]| evidence.last().unwrap().clone();
+    let present = |show: &mut Show<'_, Vga>, tick| {
+        show.present(tick, &mut |_| {});
+        evidence(show, tick)
+    };
+    for line in ["scene cube", "mapper exact"] {
+        done(&mut show, line, 0);
+    }
+    let full = present(&mut show, 100);
+    done(&mut show, "steer quality", 100);
+    let moving = present(&mut show, 101);
+    done(&mut show, "steer pause", 101);
+    let standing = present(&mut show, 102);
+    assert_eq!(present(&mut show, 200)[0], standing[0]);
+    done(&mut show, "mapper shifts", 200);
+    done(&mut show, "steer pause", 200);
+    let affine = present(&mut show, 201);
+    let names = [&full, &moving, &standing, &affine].map(|evidence| drawn(evidence));
+    assert_eq!(
+        names,
+        ["drawn exact", "drawn exact~", "drawn exact", "drawn shifts"]
+    );
+
+    let log = done(&mut show, "log", 201);
+    done(&mut show, "hold", 0);
+    for line in &log {
+        done(&mut show, line, 0);
+    }
+    for (tick, shown) in [
+        (100, &full),
+        (101, &moving),
+        (102, &standing),
+        (201, &affine),
+    ] {
+        done(&mut show, &format!("show at {tick}"), 0);
+        assert_eq!(&evidence(&mut show, 0), shown, "at {tick}");
+    }
+    // A picture by its name is never lower.
+    done(&mut show, "mapper exact", 0);
+    done(&mut show, "show 101", 0);
+    let named = evidence(&mut show, 0);
+    assert_eq!(drawn(&named), "drawn exact");
+    assert_ne!(named[0], moving[0]);
 }

@@ -236,6 +236,19 @@ impl Mapper {
         named.map_or("", |(name, ..)| name)
     }
 
+    /// A faster one that may be further off, for what moves: an error that was chosen becomes two
+    /// texels at least, and what is nearly exact is drawn in linear pieces. Others have none.
+    pub fn lower(self) -> Option<Self> {
+        const UNSEEN: Tolerance = Tolerance::new(2, 1).expect("two texels are legal");
+        match self {
+            Self::Within(tolerance) if tolerance < UNSEEN => Some(Self::Within(UNSEEN)),
+            Self::Exact | Self::Quadratic(_) | Self::Free | Self::Level => {
+                Some(Self::Linear(Pieces::Of(16)))
+            }
+            _ => None,
+        }
+    }
+
     /// How its runs are drawn.
     pub fn style(self) -> Style {
         let mut style = Style {
@@ -338,5 +351,27 @@ impl fmt::Display for Mapper {
             Self::Within(tolerance) => write!(f, "within-{tolerance}"),
             _ => f.write_str(self.name()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Jobs of either may stand in one list.
+    #[test]
+    fn what_is_lower_is_drawn_by_the_same_loops_and_no_lower_again() {
+        let mut some = 0;
+        for (name, mapper, _) in Mapper::ALL {
+            if let Some(lower) = mapper.lower() {
+                some += 1;
+                assert_eq!(lower.style(), mapper.style(), "{name}");
+                assert_eq!(lower.lower(), None, "{name}");
+            }
+        }
+        assert_eq!(Mapper::Exact.lower(), Mapper::parse("linear-16"));
+        assert_eq!(Mapper::parse("within-3").unwrap().lower(), None);
+        assert_eq!(Mapper::default().lower(), None);
+        assert!(some > 8, "{some}");
     }
 }

@@ -189,6 +189,23 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
         }
     }
 
+    /// Has the next faces mapped in another way.
+    ///
+    /// # Panics
+    /// If the other mapper's runs are drawn by other loops: those in the list are drawn together.
+    pub fn set_mapper(&mut self, mapper: Mapper) {
+        if mapper == self.mapper {
+            return;
+        }
+        assert_eq!(
+            self.mapper.style(),
+            mapper.style(),
+            "{} and {mapper} are drawn by different loops",
+            self.mapper
+        );
+        self.mapper = mapper;
+    }
+
     /// Counts a face that could not even be placed on the screen.
     pub fn drop_face(&mut self) {
         self.stats.dropped += 1;

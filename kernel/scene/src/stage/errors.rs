@@ -6,7 +6,8 @@ use modex::{Destination, HEIGHT};
 use texmap::Job;
 use texmap::plane::coordinate;
 
-use super::{LIGHT_LEVELS, Stage, polygons};
+use super::motion::Quality;
+use super::{Stage, lit, polygons};
 use crate::Pose;
 
 impl Stage<'_> {
@@ -26,6 +27,7 @@ impl Stage<'_> {
             self.find_visible(pose);
         }
         let visible = &*self.visible;
+        let quality = Quality::of(self.mapper, pose, self.next.as_ref());
         let mut most = 0;
         polygons(
             &self.mesh,
@@ -34,9 +36,7 @@ impl Stage<'_> {
             pose,
             |face_number, face| {
                 let Some(face) = face else { return };
-                let number = usize::from(face.texture);
-                let texture =
-                    self.surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, self.texels);
+                let texture = lit(&self.surfaces, self.texels, face.texture);
                 let plane = face.plane();
                 let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
                     let c = plane.c.at(x, y);
@@ -60,8 +60,8 @@ impl Stage<'_> {
                     run.draw(destination);
                 };
                 // What is outside the legal range is not drawn otherwise, either.
-                let _ = self
-                    .mapper
+                let _ = quality
+                    .mapper(&face)
                     .jobs(&face, &texture, |job| match self.mesh.convex {
                         true => draw(job),
                         false => visible.cut(face_number, &job, &mut draw),

@@ -1,0 +1,485 @@
+//! How the texture moves on the screen, from one picture to the next.
+//!
+//! # The sweet spot
+//!
+//! Chapter 57 tells of a speed at which the eye takes pictures for motion, between one that is too slow
+//! and one that is too fast, and leaves finding it to experience. Here both ends are measured.
+//!
+//! Too slow: a texture's edge is drawn in whole pixels, so it does not glide, it steps, a pixel at a
+//! time. Pictures that come fewer than some twelve a second are seen one by one ([`STEPS_A_SECOND`]);
+//! so are these steps, and every edge, stepping in its own time, is seen to crawl.
+//!
+//! Too fast: the eye joins an edge to the nearest like it in the picture before. Moved on by half a
+//! period, a pattern lies as far ahead of the one before as behind it, and further it seems to run
+//! backward.
+//!
+//! So the median motion of all that is seen, in pixels from picture to picture, has to lie between
+//! the two. It scales with the speed of turning, and so do the ends with the rate of pictures: where
+//! one is in the range says how much faster or slower it may turn.
+//!
+//! # The motion
+//!
+//! Of a pixel's texture coordinates before and after; and of their slopes, which say how many pixels
+//! that is. Both come from the faces' planes, as the exact mapper's do. On a grid of pixels, since it
+//! is a median that is looked for, and from the faces that are seen alone.
+//!
+//! # The period
+//!
+//! Of a pattern of many periods the finest matter: that of the root mean square frequency is taken,
+//! along u or v, whichever is shorter. For one wave it is its period. With d the mean square of what a
+//! texel differs by from the next one, and s that of what it differs by from the mean, a wave of w
+//! radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
+
+use modex::{HEIGHT, Palette, WIDTH};
+use texmap::coverage::{Axis, spans};
+use texmap::plane::{Anchor, Plane, coordinate};
+use texmap::{Face, Mapper, Texture};
+
+use super::{Stage, lit, polygons};
+use crate::pose::Orientation;
+use crate::trig::sin;
+use crate::{FOCAL_LENGTH, Pose, Vec3};
+
+/// Pictures a second that are seen one by one, and no longer as motion. (P. Read and M.-P. Meyer,
+/// Restoration of Motion Picture Film, 2000: 10 to 12.)
+pub const STEPS_A_SECOND: u32 = 12;
+
+/// Pixels from a sample to the next, either way.
+const GRID: u16 = 8;
+/// Most samples.
+const SAMPLES: usize = WIDTH / GRID as usize * (HEIGHT / GRID as usize);
+
+/// How what is seen of a texture moves in a tick: medians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Motion {
+    /// On the screen, in 2^-16 pixel.
+    pub pixels: u32,
+    /// In the texture, as a part of half its period, 2^-16.
+    pub part: u32,
+}
+
+impl Motion {
+    /// What the eye joins: the least and most pixels from picture to picture, 16.16, at so many ticks
+    /// a picture, 16.16. Nothing if nothing moves in the texture.
+    pub fn sweet_spot(&self, ticks: u32, ticks_a_second: u32) -> Option<(u32, u32)> {
+        let least = u64::from(STEPS_A_SECOND) * u64::from(ticks) / u64::from(ticks_a_second);
+        let most = (u64::from(self.pixels) << 16).checked_div(u64::from(self.part))?;
+        Some((least as u32, most.min(u64::from(u32::MAX)) as u32))
+    }
+}
+
+/// From the solid's place in one pose to that in another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Move {
+    from: (Orientation, i32),
+    to: (Orientation, i32),
+}
+
+impl Move {
+    pub fn new(from: &Pose, to: &Pose) -> Self {
+        let [from, to] = [from, to].map(|pose| (pose.orientation(), pose.distance));
+        Self { from, to }
+    }
+
+    /// Where a point of the viewer's space comes to lie, to within some 2^-16 unit.
+    fn point(&self, [x, y, z]: Vec3) -> Vec3 {
+        let (from, to) = (&self.from, &self.to);
+        let [x, y, z] = to.0.turn(from.0.turn_back([x, y, z - from.1]));
+        [x, y, z + to.1]
+    }
+
+    fn anchors(&self, anchors: &[Anchor; 3]) -> [Anchor; 3] {
+        anchors.map(|anchor| Anchor {
+            position: self.point(anchor.position),
+            ..anchor
+        })
+    }
+
+    /// Whether the motion hides errors of a face's texture: if one of its points moves by half a pixel
+    /// or more, and the face does not move in its own plane. There a texture glides on as it is, and
+    /// a bend that stands still in it is seen.
+    pub fn hides_errors(&self, anchors: &[Anchor; 3]) -> bool {
+        let places = anchors.map(|anchor| anchor.position.map(i64::from));
+        let ways = anchors.map(|anchor| {
+            let to = self.point(anchor.position);
+            [0, 1, 2].map(|k| i64::from(to[k]) - i64::from(anchor.position[k]))
+        });
+        // What is beside or behind the eye has no place on the screen, and moves fast where it has.
+        let moves = places.iter().zip(&ways).any(|(place, way)| {
+            2 * i64::from(FOCAL_LENGTH) * way[0].abs().max(way[1].abs()) >= place[2]
+        });
+        let [a, b] = [1, 2].map(|i| [0, 1, 2].map(|k| places[i][k] - places[0][k]));
+        let cross = [1, 2, 0].map(|i| {
+            let j = (i + 1) % 3;
+            a[i] * b[j] - a[j] * b[i]
+        });
+        // Below 2^51 before, and below 2^24 then: a square of it with one of a way, 2^26, fits.
+        let largest = cross
+            .iter()
+            .fold(0, |most, k: &i64| most.max(k.unsigned_abs()));
+        let shift = (64 - largest.leading_zeros()).saturating_sub(24);
+        let normal = cross.map(|k| i128::from(k >> shift));
+        let dot = |a: [i128; 3], b: [i128; 3]| (0..3).map(|k| a[k] * b[k]).sum::<i128>();
+        let ways = ways.map(|way| way.map(i128::from));
+        let out: i128 = ways.iter().map(|&way| dot(way, normal).pow(2)).sum();
+        let all: i128 = ways.iter().map(|&way| dot(way, way)).sum();
+        // The sine of seven degrees is an eighth.
+        moves && 64 * out > all * dot(normal, normal)
+    }
+}
+
+/// Which mapper a face is drawn by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Quality {
+    mapper: Mapper,
+    /// The faster one, and what hides its errors.
+    lower: Option<(Mapper, Move)>,
+}
+
+impl Quality {
+    /// By `mapper`; or lower where the motion to `next` hides it.
+    pub fn of(mapper: Mapper, pose: &Pose, next: Option<&Pose>) -> Self {
+        let next = next.filter(|next| *next != pose);
+        let lower = mapper.lower().zip(next);
+        Self {
+            mapper,
+            lower: lower.map(|(lower, next)| (lower, Move::new(pose, next))),
+        }
+    }
+
+    /// The face's mapper.
+    pub fn mapper(&self, face: &Face<'_>) -> Mapper {
+        match self.lower {
+            Some((lower, moved)) if moved.hides_errors(&face.anchors) => lower,
+            _ => self.mapper,
+        }
+    }
+}
+
+/// Half the period of a texture's root mean square frequency, 16.16 texels, 1 and more. A texture of
+/// one colour has none.
+pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u32> {
+    let sides = texture
+        .tile()
+        .unwrap_or((texture.width(), texture.height()));
+    let (width, height) = (usize::from(sides.0), usize::from(sides.1));
+    // Luma, the usual weights in sixteenths.
+    let luma = palette.map(|[r, g, b]| 5 * i64::from(r) + 9 * i64::from(g) + 2 * i64::from(b));
+    let pitch = usize::from(texture.pitch());
+    let at = |i: usize, j: usize| luma[usize::from(texture.texels()[j * pitch + i])];
+    let (mut sum, mut squares, mut across, mut down) = (0, 0, 0, 0);
+    for j in 0..height {
+        for i in 0..width {
+            let here = at(i, j);
+            sum += here;
+            squares += here * here;
+            across += (at((i + 1) % width, j) - here).pow(2);
+            down += (at(i, (j + 1) % height) - here).pow(2);
+        }
+    }
+    // Below 65 536 texels of 2^10 squared, once more times 65 536: fits.
+    let texels = (width * height) as i64;
+    let spread = squares - sum * sum / texels;
+    let differences = across.max(down);
+    if spread == 0 || differences == 0 {
+        return None;
+    }
+    // sin^2(w / 2), 60 fraction bits.
+    let ratio = ((i128::from(differences) << 60) / (4 * i128::from(spread))).min(1 << 60);
+    // w / 2 as a fraction of a turn, from the top bit down; a quarter at most.
+    let mut angle = 0u32;
+    for bit in (0..30).rev() {
+        let next = angle | 1 << bit;
+        if i128::from(sin(next)).pow(2) <= ratio {
+            angle = next;
+        }
+    }
+    // pi / w: a quarter turn over w / 2.
+    Some(((1u64 << 46) / u64::from(angle.max(1))).min(1 << 31) as u32)
+}
+
+impl Stage<'_> {
+    /// How what is seen of the texture in `pose` moves to `next`. Nothing if there is not enough to
+    /// be seen to tell.
+    pub fn motion(&mut self, pose: &Pose, next: &Pose) -> Option<Motion> {
+        if !self.mesh.convex {
+            self.find_visible(pose);
+        }
+        let visible = &*self.visible;
+        let half_period = self.half_period?;
+        let moved = Move::new(pose, next);
+        let (mut pixels, mut parts) = ([0; SAMPLES], [0; SAMPLES]);
+        let mut count = 0;
+        polygons(
+            &self.mesh,
+            self.mipmaps,
+            self.points,
+            pose,
+            |number, face| {
+                let Some(face) = face else { return };
+                let texture = lit(&self.surfaces, self.texels, face.texture);
+                let size = (texture.width(), texture.height());
+                let before = face.plane();
+                let after = Plane::new(&moved.anchors(&face.anchors), FOCAL_LENGTH);
+                // What is outside the legal range is not seen.
+                let _ = spans(Axis::Down, face.polygon, |run| {
+                    if run.line % GRID != GRID / 2 {
+                        return;
+                    }
+                    for y in (run.first..run.first + run.len).filter(|y| y % GRID == GRID / 2) {
+                        let x = run.line;
+                        let seen = self.mesh.convex || visible.at(x, y) == Some(number);
+                        if let Some((pixel, texel)) = sample(&before, &after, size, x, y)
+                            && seen
+                            && count < SAMPLES
+                        {
+                            pixels[count] = pixel;
+                            parts[count] = ((u64::from(texel) << 16) / u64::from(half_period))
+                                .min(u64::from(u32::MAX))
+                                as u32;
+                            count += 1;
+                        }
+                    }
+                });
+            },
+        );
+        let median = |values: &mut [u32]| *values.select_nth_unstable(values.len() / 2).1;
+        (count > 0).then(|| Motion {
+            pixels: median(&mut pixels[..count]),
+            part: median(&mut parts[..count]),
+        })
+    }
+}
+
+/// How far the texture moves at a pixel: on the screen, 16.16 pixels, and in itself, 16.16 texels.
+/// Nothing where a border of the texture is near, or its slopes leave no direction.
+fn sample(before: &Plane, after: &Plane, size: (u16, u16), x: u16, y: u16) -> Option<(u32, u32)> {
+    let at = |plane: &Plane, x: u16, y: u16| {
+        let c = plane.c.at(x, y);
+        let inside = |n: i64, size: u16| {
+            let found = coordinate(n, c, size);
+            // The borders themselves are where all that lies beyond is brought.
+            (found > 0 && found < (i32::from(size) << 16) - 1).then_some(i64::from(found))
+        };
+        Some((
+            inside(plane.a.at(x, y), size.0)?,
+            inside(plane.b.at(x, y), size.1)?,
+        ))
+    };
+    let (u, v) = at(before, x, y)?;
+    let (right, down) = (at(before, x + 1, y)?, at(before, x, y + 1)?);
+    let (moved_u, moved_v) = at(after, x, y)?;
+    let (du, dv) = (moved_u - u, moved_v - v);
+    let (ux, vx, uy, vy) = (right.0 - u, right.1 - v, down.0 - u, down.1 - v);
+    // All of them are below 2^24, so these are below 2^49.
+    let turn = ux * vy - uy * vx;
+    let shift = |n: i64| {
+        let shift = (i128::from(n) << 16).checked_div(i128::from(turn))?;
+        Some(shift.clamp(-(1 << 40), 1 << 40))
+    };
+    let (dx, dy) = (shift(du * vy - dv * uy)?, shift(dv * ux - du * vx)?);
+    let length = |a: i128, b: i128| (a * a + b * b).isqrt().min(i128::from(u32::MAX)) as u32;
+    Some((length(dx, dy), length(du.into(), dv.into())))
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::Storage;
+    use crate::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+    use std::boxed::Box;
+    use std::vec::Vec;
+
+    /// A grey ramp.
+    fn greys() -> Palette {
+        core::array::from_fn(|i| [i as u8 / 4; 3])
+    }
+
+    /// Half the period of a texture whose texel has the brightness of 0 to 255.
+    fn half_period_of(side: u16, texel: impl Fn(f64, f64) -> f64) -> Option<f64> {
+        let places = (0..side).flat_map(|j| (0..side).map(move |i| (i, j)));
+        let texels: Vec<u8> = places
+            .map(|(i, j)| texel(i.into(), j.into()).round() as u8)
+            .collect();
+        let texture = Texture::new(&texels, side, side).unwrap();
+        half_period(&texture, &greys()).map(|half| f64::from(half) / 65_536.0)
+    }
+
+    #[test]
+    fn a_wave_has_its_own_period_and_of_two_the_shorter_counts_more() {
+        let wave = |x: f64, period: f64| 60.0 * (core::f64::consts::TAU * x / period).sin();
+        for period in [2.5, 4.0, 8.0, 16.0, 32.0] {
+            let side = 160;
+            for along in [true, false] {
+                let half =
+                    half_period_of(side, |i, j| 128.0 + wave(if along { i } else { j }, period));
+                let half = half.unwrap();
+                assert!(
+                    (half - period / 2.0).abs() < period / 40.0,
+                    "{period}: {half}"
+                );
+            }
+        }
+        let stripes = half_period_of(64, |i, _| if i % 2.0 == 0.0 { 40.0 } else { 200.0 });
+        assert_eq!(stripes, Some(1.0));
+        let mixed = half_period_of(160, |i, _| 128.0 + wave(i, 8.0) + wave(i, 40.0)).unwrap();
+        assert!((4.0..8.0).contains(&mixed), "{mixed}");
+        assert_eq!(half_period_of(64, |_, _| 77.0), None);
+    }
+
+    /// Calls `check` with each scene's entry and a stage of it.
+    fn staged(mut check: impl FnMut(&Entry<'_>, &mut Stage<'_>)) {
+        for entry in &CATALOGUE {
+            let mut texels = Box::new([0; MAX_TEXELS]);
+            let textures = entry.paint(&mut texels);
+            let mut storage = Box::new(Storage::new());
+            check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
+        }
+    }
+
+    /// The median motion by another way: each pixel's ray to the face that is seen there, in floating
+    /// point, and from there with the solid to where it is seen next. On a finer grid.
+    fn median_by_rays(stage: &mut Stage<'_>, pose: &Pose, next: &Pose) -> f64 {
+        let rows = |pose: &Pose| {
+            let orientation = pose.orientation();
+            let columns = [0, 1, 2].map(|k| {
+                let mut unit = [0; 3];
+                unit[k] = 1 << 29;
+                orientation
+                    .turn(unit)
+                    .map(|n| f64::from(n) / f64::from(1 << 29))
+            });
+            [0, 1, 2].map(|row| [0, 1, 2].map(|column| columns[column][row]))
+        };
+        let (from, to) = (rows(pose), rows(next));
+        let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+        let unit = |n: i32| f64::from(n) / 65_536.0;
+        let focal = f64::from(FOCAL_LENGTH);
+        let convex = stage.mesh.convex;
+        let mut faces = std::collections::HashMap::new();
+        let mut at = std::collections::HashMap::new();
+        stage.polygons(pose, |number, face| {
+            let Some(face) = face else { return };
+            let [a, b, c] = face.anchors.map(|anchor| anchor.position.map(unit));
+            let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
+            let normal = [1, 2, 0].map(|i| u[i] * v[(i + 1) % 3] - u[(i + 1) % 3] * v[i]);
+            faces.insert(number, (normal, dot(normal, a)));
+            let _ = spans(Axis::Down, face.polygon, |run| {
+                for y in run.first..run.first + run.len {
+                    if run.line % 3 == 1 && y % 3 == 1 {
+                        at.entry((run.line, y)).or_insert(number);
+                    }
+                }
+            });
+        });
+        if !convex {
+            let visible = stage.find_visible(pose);
+            at.retain(|&(x, y), number| {
+                visible.at(x, y).is_some_and(|seen| {
+                    *number = seen;
+                    true
+                })
+            });
+        }
+        let mut ways: Vec<f64> = at
+            .iter()
+            .map(|(&(x, y), number)| {
+                let (normal, height) = faces[number];
+                let ray = [f64::from(x) - 159.5, f64::from(y) - 119.5, focal];
+                let t = height / dot(normal, ray);
+                let [px, py, pz] = ray.map(|k| k * t);
+                let place = [px, py, pz - unit(pose.distance)];
+                let own =
+                    [0, 1, 2].map(|k| (0..3).map(|row| from[row][k] * place[row]).sum::<f64>());
+                let [qx, qy, qz] = to.map(|row| dot(row, own));
+                let qz = qz + unit(next.distance);
+                let (dx, dy) = (focal * qx / qz - ray[0], focal * qy / qz - ray[1]);
+                dx.hypot(dy)
+            })
+            .collect();
+        ways.sort_by(f64::total_cmp);
+        ways[ways.len() / 2]
+    }
+
+    /// Where the default turn of each scene lies. What sways stands still at either end of its way, and
+    /// is slow all the time: its floors and its wall are there to be looked at, not to turn.
+    #[test]
+    fn the_default_turn_lies_in_the_sweet_spot() {
+        staged(|entry, stage| {
+            let sways = ["grazing-16", "grazing-4096", "wall"].contains(&entry.name);
+            let (mut pixels, mut ends) = (Vec::new(), Vec::new());
+            for tick in (0..720).step_by(48) {
+                let (pose, next) = (entry.pose(tick), entry.pose(tick + 1));
+                let motion = stage.motion(&pose, &next).unwrap();
+                let found = f64::from(motion.pixels) / 65_536.0;
+                let rays = median_by_rays(stage, &pose, &next);
+                let near = (found - rays).abs() < 0.03 + rays / 20.0;
+                assert!(near, "{} at {tick}: {found}, {rays} by rays", entry.name);
+                let Some((least, most)) = motion.sweet_spot(1 << 16, 60) else {
+                    continue;
+                };
+                assert!(
+                    sways || (least..most).contains(&motion.pixels),
+                    "{} at {tick}: {motion:?}",
+                    entry.name
+                );
+                pixels.push(found);
+                ends.push(f64::from(most) / 65_536.0);
+            }
+            for values in [&mut pixels, &mut ends] {
+                values.sort_by(f64::total_cmp);
+            }
+            let (middle, most) = (pixels[pixels.len() / 2], ends[ends.len() / 2]);
+            std::println!(
+                "{}: {middle:.2} pixels a picture ({:.2} to {:.2}), the sweet spot is 0.20 to {most:.1}",
+                entry.name,
+                pixels[0],
+                pixels[pixels.len() - 1]
+            );
+        });
+    }
+
+    /// Twice as many ticks a picture, and steps come twice as slowly.
+    #[test]
+    fn the_sweet_spot_scales_with_the_rate_of_pictures() {
+        let motion = Motion {
+            pixels: 1 << 16,
+            part: 1 << 14,
+        };
+        assert_eq!(motion.sweet_spot(1 << 16, 60), Some((13_107, 4 << 16)));
+        assert_eq!(motion.sweet_spot(5 << 16, 60), Some((1 << 16, 4 << 16)));
+        assert_eq!(Motion { part: 0, ..motion }.sweet_spot(1 << 16, 60), None);
+    }
+
+    /// What turns in its own plane is never lower, whatever it is drawn by; what tumbles is.
+    #[test]
+    fn a_face_that_moves_in_its_own_plane_keeps_its_quality() {
+        staged(|entry, stage| {
+            let mut lowered = 0;
+            for tick in (0..720).step_by(48) {
+                for name in ["exact", "within-1/4", "shifts", "row-steps", "linear-8"] {
+                    stage.set_mapper(Mapper::parse(name).unwrap());
+                    let pose = entry.pose(tick);
+                    let mut draw = |next| {
+                        stage.lower_for(next);
+                        let mut page = Box::new(modex::PlanarBuffer::new());
+                        let stats = stage.draw(&pose, &mut *page);
+                        (stats.pixels, stage.lowered())
+                    };
+                    let (pixels, none) = draw(None);
+                    assert_eq!((none, draw(Some(pose)).1), (0, 0));
+                    let (same, some) = draw(Some(entry.pose(tick + 1)));
+                    assert_eq!(same, pixels, "{} {name} at {tick}", entry.name);
+                    assert!(
+                        some == 0 || ["exact", "within-1/4"].contains(&name),
+                        "{name}"
+                    );
+                    lowered += some;
+                }
+            }
+            let in_plane = ["facing", "tilted"].contains(&entry.name);
+            assert_eq!(lowered == 0, in_plane, "{}: {lowered}", entry.name);
+        });
+    }
+}
