@@ -305,7 +305,7 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         (
             "cut in a line",
             good[..99_999].into(),
-            ["line 172: it is cut short", "take the dump again"],
+            ["line 173: it is cut short", "take the dump again"],
         ),
         (
             "edited",

@@ -314,8 +314,8 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
 /// Makes the user's model, if there is one, and tells what it is.
 fn load(files: &Files) -> anyhow::Result<Option<Model>> {
     let model = files.load()?;
-    if let Some(model) = &model {
-        say(model);
+    if let (Some(model), Some(path)) = (&model, &files.model) {
+        say(format_args!("{}: {model}", path.display()));
     }
     Ok(model)
 }

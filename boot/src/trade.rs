@@ -486,6 +486,7 @@ impl Found {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::Model;
 
     #[test]
     fn a_debug_build_refuses() {
@@ -500,17 +501,22 @@ mod tests {
         let mappers = mappers.map(|name| Mapper::parse(name).unwrap());
         let effort = Effort { slice: 1 };
         fs::create_dir(out.path().join("pictures")).unwrap();
-        let found = measure(&["tilted", "wall"], None, &mappers, 1, effort);
+        let model = Model::new(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n", None).unwrap();
+        let mut arena = Box::new(Arena::new());
+        let model = model.pack().entry(&mut arena);
+        let scenes = ["tilted", "wall", model.name];
+        let found = measure(&scenes, Some(&model), &mappers, 1, effort);
         found.write(out.path(), &["about".into()]).unwrap();
         let read = |name: &str| fs::read_to_string(out.path().join(name)).unwrap();
         let csv = read("trade.csv");
-        assert_eq!(csv.lines().count(), 1 + 2 * 4 * 2);
+        assert_eq!(csv.lines().count(), 1 + 3 * 4 * 2);
         assert_eq!(read("sweep.csv").lines().count(), 1 + SWEEPS * 4 * 2);
         let md = read("trade.md");
         for part in [
             "## all scenes",
             "## tilted",
             "## wall",
+            "## model",
             "## aims",
             "## The seeds on trial",
         ] {
