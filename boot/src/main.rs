@@ -28,8 +28,8 @@ const WARM_UP: Duration = Duration::from_secs(1);
 /// operating system.
 ///
 /// On first use it fetches a compiler into your cache folder and, where that is allowed, installs
-/// QEMU; it says what it does. Close the window or type Ctrl-C to end it. Without a display it
-/// boots all the same and leaves a picture.
+/// QEMU; it says what it does. In the window the key H tells the keys that steer it; close it or
+/// type Ctrl-C to end it. Without a display it boots all the same and leaves a picture.
 #[derive(Debug, Parser)]
 #[command(version, after_help = AFTER_HELP)]
 struct Cli {

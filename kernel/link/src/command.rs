@@ -10,7 +10,8 @@ pub enum Command {
     /// `hold`: stop the show, clear the pages, take every setting back, and draw only what is asked
     /// for. From here on the picture memory depends on the commands alone.
     Hold,
-    /// `run`: let the show run.
+    /// `run`: let the show run. One that was held has the settings that are set, and moves as its scene
+    /// does.
     Run,
     /// `show PICTURE`: draw it on the next page, flip, and answer when the flip holds. A show
     /// that runs is stopped first, its settings as they are.

@@ -482,8 +482,11 @@ impl<'a> Log<'a> {
 mod tests {
     extern crate std;
     use super::*;
+    use scene::Mesh;
+    use scene::catalogue::Colours;
     use std::boxed::Box;
     use std::vec::Vec;
+    use texmap::Texture;
 
     fn random() -> fastrand::Rng {
         let seed = fastrand::u64(..);
@@ -678,6 +681,31 @@ mod tests {
         // It is not in the list, and has its neighbours all the same.
         act(&mut state, 0, Action::NextMapper);
         assert_eq!(state.mapper.name(), "within-1/2");
+    }
+
+    /// A model that was loaded is the scene to begin with, and has its place behind the others.
+    #[test]
+    fn a_model_is_a_scene_among_the_others() {
+        let mesh = Mesh {
+            vertices: &[],
+            corners: &[],
+            faces: &[],
+            convex: true,
+        };
+        let model = Entry::loaded(mesh, Texture::DOT, Colours::BUILT_IN, &[0; modex::HEIGHT]);
+        let scenes = Scenes::new(Some(model));
+        let mut state = State::of(scenes, scenes.default());
+        assert_eq!(state.entry.name, Entry::LOADED);
+        for entry in &CATALOGUE {
+            act(&mut state, 0, Action::NextScene);
+            assert_eq!(state.entry.name, entry.name);
+        }
+        act(&mut state, 0, Action::NextScene);
+        assert_eq!(state.entry.name, Entry::LOADED);
+        act(&mut state, 0, Action::Reset);
+        assert_eq!(state.entry.name, Entry::LOADED);
+        let by_name = Change::Set(Setting::Scene, Word::new(Entry::LOADED).unwrap());
+        assert_eq!(own(0).change(0, &by_name), Err(Unknown));
     }
 
     #[test]

@@ -1,7 +1,6 @@
 //! The card: ports and window decoded, faults noted, accesses counted.
 
 use std::collections::BTreeMap;
-use std::ptr::NonNull;
 
 use modex::registers::*;
 use modex::{Bus, Lane, PAGE_BYTES, PLANE_BYTES, Purpose};
@@ -412,9 +411,7 @@ impl Bus for Vga {
             self.note(Access::Store(at, 0), Err(("store past the window", state)));
         }
         let mut staging = vec![0; span + 1];
-        let base = NonNull::from(&mut staging[..]).cast();
-        // SAFETY: the staging bytes span the lane, and nothing else reaches them meanwhile.
-        draw(unsafe { Lane::new(base, len) });
+        draw(Lane::over(&mut staging));
         for (pixel, &byte) in (0..len).zip(staging.iter().step_by(STEP)) {
             self.store(at.wrapping_add(pixel * STEP as u16), byte);
         }
