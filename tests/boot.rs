@@ -15,13 +15,12 @@ use std::process::{Command as Process, Output, Stdio};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use crystal_ball::card::{Card, Emulated};
+use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::machine::{Machine, Verdict};
 use judged::{Judged, verdict};
 use link::{Action, Change, Command, Content, Fault, Picture};
 use modex::registers::MODE_X;
 use ready::{READY, config};
-use show::Memory;
 
 fn boot() -> Machine {
     Machine::boot(&config()).expect("boots")
@@ -146,7 +145,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
             .starts_with("pose ")
     );
 
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let cards: [&mut dyn Card; 2] = [&mut machine, &mut emulated];
     for card in cards {
@@ -397,7 +396,7 @@ fn without_a_display_a_picture_is_left() {
         (640, 480, 3 * 640)
     );
     // It is the picture of some tick of the first minute, from edge to edge.
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut is_of = |frame| {
         emulated.ask(Command::Show(Picture::Frame(frame))).unwrap();

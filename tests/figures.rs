@@ -2,12 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use crystal_ball::card::{Card, Emulated};
+use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::golden::{self, Findings, Golden, Transfer};
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::setup::{self, Options};
 use link::{Command, Content, Picture};
-use show::Memory;
 
 /// How long the running show is watched.
 const WATCHED: Duration = Duration::from_secs(60);
@@ -21,7 +20,7 @@ fn figures() {
     let ready = setup::ready(&options).expect("the set-up");
     let config = Config::new(&ready);
     let goldens = golden::find(&golden::folder()).expect("golden frames");
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).expect("an emulated card");
     let (mut set_ups, mut kernels, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
     let mut verified = Vec::new();

@@ -10,14 +10,13 @@ use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::LazyLock;
 
-use crystal_ball::card::{Card, Emulated};
+use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::diff::Subject;
 use crystal_ball::golden::{self, Findings, Golden, Transfer};
 use crystal_ball::machine::Machine;
 use emulator::Access;
 use link::{Command, Content, Picture};
 use ready::{READY, config};
-use show::Memory;
 use tempfile::TempDir;
 
 fn goldens() -> Vec<Golden> {
@@ -40,7 +39,7 @@ fn conclude(findings: Findings, test: &str) {
 
 #[test]
 fn emulated_card_draws_every_golden() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut findings = Findings::default();
     let goldens = goldens();
@@ -53,7 +52,7 @@ fn emulated_card_draws_every_golden() {
 
 #[test]
 fn qemu_shows_and_holds_every_golden_byte_for_byte() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut machine = Machine::boot(&config()).unwrap();
     let mut findings = Findings::default();
@@ -96,7 +95,7 @@ fn agrees(goldens: &[Golden], vga: &str, arguments: &str) {
     config.vga = vga.into();
     config.arguments = arguments.split_whitespace().map(Into::into).collect();
     let mut machine = Machine::boot(&config).unwrap_or_else(|error| panic!("{what}: {error}"));
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut findings = Findings::default();
     for golden in goldens {
@@ -127,7 +126,7 @@ fn evidence(arguments: &str) -> Vec<String> {
 
 /// What the emulated card says to the same.
 fn emulated_evidence() -> Vec<String> {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     emulated
         .show(&[0, 480, u32::MAX].map(Picture::Frame))
@@ -210,7 +209,7 @@ fn two_goldens() -> TempDir {
 
 /// What checking a folder finds.
 fn found(folder: &Path) -> Vec<String> {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut findings = Findings::default();
     for golden in golden::find(folder).unwrap() {
@@ -267,7 +266,7 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
 /// A picture that is not the one that was asked for, as like it as it may be.
 #[test]
 fn the_wrong_frame_is_found() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut dump = |frame| {
         emulated.show(&[Picture::Frame(frame)]).unwrap();
@@ -314,7 +313,7 @@ fn a_blessing_tells_what_changes_and_makes_the_goldens() {
 /// A stray write anywhere is seen: on a hidden page, behind the last one, in another plane.
 #[test]
 fn all_of_video_memory_is_as_the_emulated_card_has_it() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut machine = Machine::boot(&config()).unwrap();
     let pictures = [0, 100, 200, 4_000_000_000, 300].map(Picture::Frame);
@@ -439,7 +438,7 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
     let mut config = config();
     config.arguments = vec!["-D".into(), trace.clone().into()];
     let mut machine = Machine::boot(&config).unwrap();
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     // The fourth picture erases what the first left on its page.
     let before = [0, 60, 120].map(Picture::Frame);

@@ -15,13 +15,12 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::Duration;
 
-use crystal_ball::card::{Card, Emulated};
+use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::dump::Dump;
 use crystal_ball::machine::{Config, Machine, Verdict};
 use judged::{Judged, verdict};
 use link::{Command, Content, Picture};
 use ready::{READY, config};
-use show::Memory;
 use tempfile::TempDir;
 
 /// What becomes of a line of the kernel's, its end included.
@@ -207,7 +206,7 @@ fn line_ends_of_a_terminal_are_accepted() {
     let plain = dump_altered(|_, line| line.to_vec()).unwrap();
     let returned = |_, line: &[u8]| [&line[..line.len() - 1], b"\r\n"].concat();
     assert_eq!(dump_altered(returned).unwrap(), plain);
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     emulated.show(&[Picture::Frame(480)]).unwrap();
     assert_eq!(emulated.dump(Content::Page).unwrap(), plain);

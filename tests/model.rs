@@ -4,13 +4,12 @@ use std::fs;
 use std::path::Path;
 use std::process::{Command as Process, Stdio};
 
-use crystal_ball::card::{Card, Emulated};
+use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::model::Model;
 use crystal_ball::screen::Screen;
 use crystal_ball::setup::{self, Options};
 use link::{Command, Content, Picture, Setting, Word};
-use show::Memory;
 use tempfile::TempDir;
 
 /// A pyramid on a star: two objects, a concave face, and faces with and without texture coordinates,
@@ -67,7 +66,7 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
     let model = model();
     let pack = model.pack();
     let mut machine = boot(model.bytes.clone(), Some(pack.checksum()));
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::with(&mut memory, Some(&pack)).unwrap();
     let pictures = [
         Picture::Frame(0),
@@ -131,7 +130,7 @@ fn a_damaged_ramdisk_is_told_and_the_built_in_scenes_are_there() {
         said.starts_with("refused pack: its header says checksum "),
         "{said}"
     );
-    let mut memory = Box::new(Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let ball = emulated.dump_of(Picture::Frame(480));
     assert_eq!(ball.header.scene, "ball");

@@ -19,6 +19,15 @@ use crate::indexed::widen;
 use crate::look::Look;
 use crate::screen::Screen;
 
+/// The program's memory, empty.
+///
+/// A call of its own: a build that is not optimised makes it on the stack first, some megabytes, and a
+/// function with several such places has room for all of them at once.
+#[inline(never)]
+pub fn memory() -> Box<Memory> {
+    Box::new(Memory::new())
+}
+
 /// A card with a show on it.
 pub trait Card {
     /// Carries a command out; the lines of its answer, without the closing `ok`.
@@ -175,7 +184,7 @@ mod tests {
     /// The kernel's own way to a dump, through the card's ports, against a look from outside.
     #[test]
     fn what_the_program_reads_back_is_what_the_card_holds() {
-        let mut memory = Box::new(Memory::new());
+        let mut memory = memory();
         let mut card = Emulated::new(&mut memory).unwrap();
         for pictures in [&[][..], &[Picture::Frame(0)], &[Picture::Frame(7); 3]] {
             card.show(pictures).unwrap();
@@ -194,7 +203,7 @@ mod tests {
 
     #[test]
     fn a_refused_command_says_why() {
-        let mut memory = Box::new(Memory::new());
+        let mut memory = memory();
         let mut card = Emulated::new(&mut memory).unwrap();
         let far = Picture::Pose {
             yaw: 0,

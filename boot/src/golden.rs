@@ -28,7 +28,7 @@ use serde::Deserialize;
 use texmap::{Mapper, Order};
 
 use crate::aside;
-use crate::card::{Card, Emulated};
+use crate::card::{self, Card, Emulated};
 use crate::diff::{Difference, Subject, compare};
 use crate::indexed::Indexed;
 use crate::look::{Look, Named};
@@ -379,7 +379,7 @@ pub fn bless(
     boot: impl FnOnce() -> anyhow::Result<Machine>,
     mut say: impl FnMut(&str),
 ) -> anyhow::Result<usize> {
-    let mut memory = Box::new(show::Memory::new());
+    let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory)?;
     let mut changes = Vec::new();
     let mut differ = Findings::default();

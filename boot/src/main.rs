@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use crystal_ball::card::{Card, Emulated};
+use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::diff;
 use crystal_ball::frames::Frames;
 use crystal_ball::golden;
@@ -19,7 +19,6 @@ use crystal_ball::model::{Files, Model};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child, record, replay, trade};
 use link::{Action, Change, Command};
-use show::Memory;
 
 /// How long the ball turns before its picture is taken without a display.
 const WARM_UP: Duration = Duration::from_secs(1);
@@ -239,7 +238,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
         Some(Subcommands::Emulate(frames)) => {
             let model = load(&files)?;
             let pack = model.as_ref().map(Model::pack);
-            let mut memory = Box::new(Memory::new());
+            let mut memory = card::memory();
             let mut card = Emulated::with(&mut memory, pack.as_ref())?;
             frames.write(&mut card, &cli.look, tell_path)?;
         }
@@ -248,14 +247,18 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
                 say(format_args!("error: {error}"));
                 return Ok(ExitCode::from(2));
             }
+            let pack = load_to_boot(&files, &mut options)?;
             let ready = setup::ready(&options)?;
             let mut machine = Machine::boot(&Config {
                 vga: cli.boot.vga,
+                pack,
                 arguments: cli.qemu_arguments,
                 ..Config::new(&ready)
             })?;
-            let mut memory = Box::new(Memory::new());
-            let mut emulated = Emulated::new(&mut memory)?;
+            let model = load(&files)?;
+            let pack = model.as_ref().map(Model::pack);
+            let mut memory = card::memory();
+            let mut emulated = Emulated::with(&mut memory, pack.as_ref())?;
             recording.record(&mut machine, &mut emulated, &cli.look, tell_path)?;
             machine.leave()?;
         }
