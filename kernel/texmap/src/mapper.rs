@@ -273,6 +273,16 @@ impl Mapper {
         texture: &Texture<'_>,
         mut sink: impl FnMut(Job),
     ) -> Result<(), Dropped> {
+        self.make_jobs(face, texture, &mut sink)
+    }
+
+    /// The same, once in a program: by what draws them it would be there ten times.
+    fn make_jobs(
+        self,
+        face: &Face<'_>,
+        texture: &Texture<'_>,
+        sink: &mut dyn FnMut(Job),
+    ) -> Result<(), Dropped> {
         match self {
             Self::Tiles => return tiles::jobs(face, texture, sink),
             Self::Free => return free::jobs(face, texture, sink),
