@@ -155,13 +155,16 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
     #[inline]
     pub fn chunks(self, pixels: u16) -> impl Iterator<Item = Self> {
         let Self { base, len, lent } = self;
-        (0..usize::from(len / pixels)).map(move |i| {
-            // SAFETY: this many lanes fit in the length, so by the contract of `new` the address
-            // is inside, and so are the `pixels` from there on, which are in no other lane.
-            let base = unsafe { base.add(i * usize::from(pixels) * STEP) };
-            let len = pixels;
-            Self { base, len, lent }
-        })
+        let step = usize::from(pixels) * STEP;
+        (0..usize::from(len / pixels) * step)
+            .step_by(step)
+            .map(move |offset| {
+                // SAFETY: this many lanes fit in the length, so by the contract of `new` the address
+                // is inside, and so are the `pixels` from there on, which are in no other lane.
+                let base = unsafe { base.add(offset) };
+                let len = pixels;
+                Self { base, len, lent }
+            })
     }
 
     /// Writes every pixel in order; `texel` is called once for each.

@@ -41,6 +41,8 @@
 //!
 //! [`plane::coordinate`]: crate::plane::coordinate
 
+use core::hint::black_box;
+
 use modex::Column;
 
 use crate::loops::Draw;
@@ -51,9 +53,6 @@ use crate::{Texture, affine};
 const MAX_STEPS: usize = modex::WIDTH - 1;
 /// Longest piece of [`Pieces::Powers`].
 const LONGEST_POWER: u16 = 64;
-
-/// Pieces whose ends are found at once.
-const BATCH: usize = 16;
 
 /// How a run is cut into pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -124,6 +123,36 @@ impl Reciprocal {
     pub fn times(self, n: i64) -> i32 {
         let high = (n as u64) << (self.shift - 8) >> 32;
         ((high * self.value) >> 39) as i32
+    }
+}
+
+/// [`Reciprocal`] where c is from [`LargeReciprocal::LEAST`] on, bit for bit: one shift does for its
+/// two.
+#[derive(Clone, Copy)]
+struct LargeReciprocal {
+    /// Bits that c has above 23.
+    down: u32,
+    value: u64,
+}
+
+impl LargeReciprocal {
+    const LEAST: i64 = 1 << 31;
+
+    #[inline]
+    fn new(c: i64) -> Self {
+        // The number of c's highest bit, as the CPU tells it.
+        let highest = 63 ^ (c as u64 | 1).leading_zeros();
+        // 32 bits, as the compiler has to know: one more of them is not zero.
+        let high = (c as u64 >> (highest - 31)) as u32;
+        Self {
+            down: highest - 23,
+            value: (1 << 63) / (u64::from(high) + 1),
+        }
+    }
+
+    #[inline]
+    fn times(self, n: i64) -> i32 {
+        (((n as u64 >> self.down) * self.value) >> 39) as i32
     }
 }
 
@@ -377,16 +406,16 @@ impl Cuts {
     }
 }
 
-/// Draws a column, linear in each piece, by `draw`, or by `draw_inline`, which is
-/// the same one, but known here.
+/// Draws a column, linear in each piece. `draw` draws each; where one comes as often as to be worth
+/// it, and has its pixels in whole eights, `draw_eights` does.
 #[inline(always)]
 pub(crate) fn linear(
     texture: &Texture<'_>,
     walk: &Walk,
     pieces: Pieces,
     draw: Draw,
-    draw_inline: impl Fn(&Texture<'_>, affine::Walk, Column<'_>),
-    column: Column<'_>,
+    draw_eights: impl Fn(&Texture<'_>, affine::Walk, Column<'_>),
+    mut column: Column<'_>,
 ) {
     let (last, mut left) = (texture.last(), column.len() - 1);
     // Both ends of the run are in the texture, before the eye: so is all between them.
@@ -401,40 +430,44 @@ pub(crate) fn linear(
     };
     let mut at = walk.at;
     let mut here = quotients(at);
-    let mut column = column;
     let alike = match pieces {
         Pieces::Of(steps) => u16::from(steps),
         Pieces::Powers => LONGEST_POWER,
         Pieces::Whole => 0,
     };
-    // The last one may have another pixel.
-    if left > alike && alike.is_power_of_two() && alike >= 8 && texture.masks().is_some() {
+    // Pieces of as many steps, a power of two, but for the last one, which has another pixel.
+    if left > alike
+        && alike >= 8
+        && alike.is_power_of_two()
+        && at[2].min(walk.after(left + alike)[2]) >= LargeReciprocal::LEAST
+        // No loop needs to ask again.
+        && texture.masks().is_some()
+    {
         let bits = alike.trailing_zeros();
+        let all = (left - 1) >> bits << bits;
+        let (pixels, rest) = column.split(all);
         let stride = walk.step.map(|step| step << bits);
         let cut = |delta: i32| {
             let up = if delta < 0 { i32::from(alike) - 1 } else { 0 };
             (delta + up) >> bits
         };
-        while left > alike {
-            // First all quotients, the divisions one after the other, then all pixels: both loops
-            // have their values in registers.
-            let all = ((left - 1) >> bits).min(BATCH as u16);
-            let mut ends = [(0, 0); BATCH];
-            let ends = &mut ends[..usize::from(all)];
-            for end in ends.iter_mut() {
-                at = [0, 1, 2].map(|k| at[k] + stride[k]);
-                *end = quotients(at);
-            }
-            let (pixels, rest) = column.split(all << bits);
-            for (&mut to, pixels) in ends.iter_mut().zip(pixels.chunks(alike)) {
-                let (u, v) = here;
-                let (du, dv) = (cut(to.0 - u), cut(to.1 - v));
-                draw_inline(texture, affine::Walk { u, v, du, dv }, pixels);
-                here = to;
-            }
-            left -= all << bits;
-            column = rest;
+        let [mut a, mut b, mut c] = [at[0], at[1], at[2] + stride[2]];
+        // Not known to be a division: the compiler would move all of them to where they are used.
+        let mut over = black_box(LargeReciprocal::new(c));
+        for pixels in pixels.chunks(alike) {
+            a += stride[0];
+            b += stride[1];
+            c += stride[2];
+            let ((u, v), to) = (here, (over.times(a), over.times(b)));
+            // The next piece's division takes its time while this one is drawn.
+            over = LargeReciprocal::new(c);
+            let (du, dv) = (cut(to.0 - u), cut(to.1 - v));
+            draw_eights(texture, affine::Walk { u, v, du, dv }, pixels);
+            here = to;
         }
+        at = [a, b, c - stride[2]];
+        left -= all;
+        column = rest;
     }
     while !column.is_empty() {
         let steps = pieces.next(left);
@@ -570,5 +603,34 @@ impl Iterator for Steps {
             Some(i) => second.after(i),
         };
         Some((at(self.piece.paths[0]), at(self.piece.paths[1])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use super::*;
+
+    #[test]
+    fn large_reciprocals_are_reciprocals() {
+        let seed = fastrand::u64(..);
+        std::println!("seed {seed}");
+        let mut random = fastrand::Rng::with_seed(seed);
+        let mut compare = |c: i64| {
+            let (one, other) = (Reciprocal::new(c), LargeReciprocal::new(c));
+            for n in [0, 1, c, random.i64(0..256 * c), 256 * c - 1] {
+                assert_eq!(one.times(n), other.times(n), "{n} / {c}");
+            }
+        };
+        for bits in 31..55 {
+            compare(1 << bits);
+            compare((2 << bits) - 1);
+        }
+        let mut random = fastrand::Rng::with_seed(!seed);
+        for _ in 0..100_000 {
+            let bits = random.u32(31..55);
+            compare(random.i64(LargeReciprocal::LEAST..2 << bits));
+        }
     }
 }
