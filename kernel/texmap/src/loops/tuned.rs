@@ -3,7 +3,8 @@
 //! One frame serves all: blocks of [`BLOCK`] pixels, each store at a constant offset (chapter 58).
 //! The first is entered where as many are left as do not fill blocks. One loop so draws any height,
 //! a column of one pixel included, with one jump that is hard to foresee. Nothing between pixels
-//! changes the carry flag (LEA steps the address, DEC counts): a loop may keep it.
+//! changes the carry flag (LEA steps the address, DEC counts): a loop may keep it. The loops that
+//! are the fastest have a second frame, for pieces of columns that come in eights.
 //!
 //! Every function gets its registers' first values in a type of [`super::steps`], which was made
 //! of a walk that stays in the texture, or has masks that do.
@@ -79,10 +80,15 @@ macro_rules! down {
     }};
 }
 
-/// The same for a column of whole eights, at least one: no entry is looked for.
+/// The frame for the whole eights of a column that has one: no entry is looked for, and what
+/// follows them is not drawn.
 macro_rules! eights {
-    ($column:ident, $pixel:ident, $($operands:tt)*) => {{
-        // SAFETY: as in `down`.
+    ($column:ident, "", $pixel:ident, $($operands:tt)*) => {{
+        let blocks = u32::from($column.len() / 8);
+        if blocks == 0 {
+            return;
+        }
+        // SAFETY: as in `down`, but for the pixels that are left over.
         unsafe {
             asm!(
                 ".p2align 4",
@@ -99,7 +105,7 @@ macro_rules! eights {
                 "dec {blocks:e}",
                 "jnz 2b",
                 dest = inout(reg) $column.as_ptr() => _,
-                blocks = inout(reg) u32::from($column.len() / 8) => _,
+                blocks = inout(reg) blocks => _,
                 texel = out(reg_abcd) _,
                 $($operands)*
                 options(nostack),
@@ -219,75 +225,51 @@ pub(super) fn two_steps(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
 }
 
 /// Two accumulators, a mask for each, one shift.
-#[inline(always)]
-pub(super) fn shifts(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    macro_rules! pixel {
-        ($offset:literal) => {
-            concat!(
-                "mov {texel:e}, {v:e}\n",
-                "and {texel:e}, {v_mask:e}\n",
-                "mov {spare:e}, {u:e}\n",
-                "and {spare:e}, {u_mask:e}\n",
-                "or {texel:e}, {spare:e}\n",
-                "shr {texel:e}, 16\n",
-                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
-                "mov byte ptr [{dest} + ",
-                $offset,
-                "], {texel:l}\n",
-                "add {u:e}, {du:e}\n",
-                "add {v:e}, {dv:e}",
-            )
+macro_rules! shifts {
+    ($frame:ident, $texture:ident, $walk:ident, $column:ident, $($more:tt)*) => {
+        macro_rules! pixel {
+            ($offset:literal) => {
+                concat!(
+                    "mov {texel:e}, {v:e}\n",
+                    "and {texel:e}, {v_mask:e}\n",
+                    "mov {spare:e}, {u:e}\n",
+                    "and {spare:e}, {u_mask:e}\n",
+                    "or {texel:e}, {spare:e}\n",
+                    "shr {texel:e}, 16\n",
+                    "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
+                    "mov byte ptr [{dest} + ",
+                    $offset,
+                    "], {texel:l}\n",
+                    "add {u:e}, {du:e}\n",
+                    "add {v:e}, {dv:e}",
+                )
+            };
+        }
+        let Some((start, mut column)) = start::<Pair>($texture, $walk, $column) else {
+            return;
         };
-    }
-    let Some((start, mut column)) = start::<Pair>(texture, walk, column) else {
-        return;
+        $frame!(column, "", pixel,
+            texels = in(reg) $texture.texels().as_ptr(),
+            u = inout(reg) start.u => _,
+            v = inout(reg) start.v => _,
+            du = in(reg) start.du,
+            dv = in(reg) start.dv,
+            u_mask = in(reg) start.u_mask,
+            v_mask = in(reg) start.v_mask,
+            $($more)*
+        );
     };
-    let texels = texture.texels().as_ptr();
-    down!(column, "", pixel,
-        texels = in(reg) texels,
-        u = inout(reg) start.u => _,
-        v = inout(reg) start.v => _,
-        du = in(reg) start.du,
-        dv = in(reg) start.dv,
-        u_mask = in(reg) start.u_mask,
-        v_mask = in(reg) start.v_mask,
-    );
 }
 
 #[inline(always)]
+pub(super) fn shifts(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+    shifts!(down, texture, walk, column,);
+}
+
+/// [`shifts`] for whole eights.
+#[inline(always)]
 pub(super) fn shifts_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    macro_rules! pixel {
-        ($offset:literal) => {
-            concat!(
-                "mov {texel:e}, {v:e}\n",
-                "and {texel:e}, {v_mask:e}\n",
-                "mov {spare:e}, {u:e}\n",
-                "and {spare:e}, {u_mask:e}\n",
-                "or {texel:e}, {spare:e}\n",
-                "shr {texel:e}, 16\n",
-                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
-                "mov byte ptr [{dest} + ",
-                $offset,
-                "], {texel:l}\n",
-                "add {u:e}, {du:e}\n",
-                "add {v:e}, {dv:e}",
-            )
-        };
-    }
-    let Some((start, mut column)) = start::<Pair>(texture, walk, column) else {
-        return;
-    };
-    let texels = texture.texels().as_ptr();
-    eights!(column, pixel,
-        spare = out(reg) _,
-        texels = in(reg) texels,
-        u = inout(reg) start.u => _,
-        v = inout(reg) start.v => _,
-        du = in(reg) start.du,
-        dv = in(reg) start.dv,
-        u_mask = in(reg) start.u_mask,
-        v_mask = in(reg) start.v_mask,
-    );
+    shifts!(eights, texture, walk, column, spare = out(reg) _,);
 }
 
 /// One accumulator and one mask, the row's bits shifted down to the column's.
@@ -398,56 +380,41 @@ pub(super) fn add_carry(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
 }
 
 /// One accumulator, and an instruction that gathers the bits of the index. The CPU must have it.
-#[inline(always)]
-pub(super) fn extract(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    macro_rules! pixel {
-        ($offset:literal) => {
-            concat!(
-                "pext {texel}, {at}, {mask}\n",
-                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
-                "mov byte ptr [{dest} + ",
-                $offset,
-                "], {texel:l}\n",
-                "add {at}, {step}",
-            )
+macro_rules! extract {
+    ($frame:ident, $texture:ident, $walk:ident, $column:ident) => {
+        macro_rules! pixel {
+            ($offset:literal) => {
+                concat!(
+                    "pext {texel}, {at}, {mask}\n",
+                    "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
+                    "mov byte ptr [{dest} + ",
+                    $offset,
+                    "], {texel:l}\n",
+                    "add {at}, {step}",
+                )
+            };
+        }
+        let Some((start, mut column)) = start::<Joint>($texture, $walk, $column) else {
+            return;
         };
-    }
-    let Some((start, mut column)) = start::<Joint>(texture, walk, column) else {
-        return;
+        $frame!(column, "", pixel,
+            texels = in(reg) $texture.texels().as_ptr(),
+            at = inout(reg) start.at => _,
+            step = in(reg) start.step,
+            mask = in(reg) start.mask,
+        );
     };
-    let texels = texture.texels().as_ptr();
-    down!(column, "", pixel,
-        texels = in(reg) texels,
-        at = inout(reg) start.at => _,
-        step = in(reg) start.step,
-        mask = in(reg) start.mask,
-    );
 }
 
 #[inline(always)]
+pub(super) fn extract(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+    extract!(down, texture, walk, column);
+}
+
+/// [`extract`] for whole eights.
+#[inline(always)]
 pub(super) fn extract_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    macro_rules! pixel {
-        ($offset:literal) => {
-            concat!(
-                "pext {texel}, {at}, {mask}\n",
-                "movzx {texel:e}, byte ptr [{texels} + {texel}]\n",
-                "mov byte ptr [{dest} + ",
-                $offset,
-                "], {texel:l}\n",
-                "add {at}, {step}",
-            )
-        };
-    }
-    let Some((start, mut column)) = start::<Joint>(texture, walk, column) else {
-        return;
-    };
-    let texels = texture.texels().as_ptr();
-    eights!(column, pixel,
-        texels = in(reg) texels,
-        at = inout(reg) start.at => _,
-        step = in(reg) start.step,
-        mask = in(reg) start.mask,
-    );
+    extract!(eights, texture, walk, column);
 }
 
 /// Whether the CPU has BMI2, and with it PEXT. Asked once: CPUID is slow, under a hypervisor most
