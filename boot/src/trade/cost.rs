@@ -20,8 +20,8 @@ use super::subject::{Owned, Subject};
 /// Rounds, of whose values the median is told.
 pub const ROUNDS: usize = 5;
 
-/// The orders that differ in RAM. [`Order::Buffer`] draws as [`Order::Planes`] does; presenting
-/// costs where there is a card.
+/// The orders that differ in RAM. [`Order::Buffer`] draws as one of them does; presenting costs
+/// where there is a card.
 pub const ORDERS: [Order; 2] = [Order::Polygons, Order::Planes];
 
 /// What is measured.

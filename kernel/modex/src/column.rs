@@ -51,7 +51,30 @@ pub trait Destination {
             self.column(x, y, 1, |pixel| pixel.fill(&mut texel));
         }
     }
+
+    /// Lends `draw` line `y` in RAM, and writes the `len` pixels from (x, y) to the right as it
+    /// leaves them, one plane after the other: `draw` stores to these pixels and nowhere else.
+    /// Neither what was there is said, nor which plane is selected afterwards.
+    ///
+    /// # Panics
+    /// As [`Destination::lane`].
+    fn line(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Line<'_>)) {
+        check_row(x, y, len);
+        let mut line = [[0; STRIDE]; 4];
+        draw(line.each_mut());
+        for first in 0..len.min(4) {
+            let (x, len) = (x + first, (len - first).div_ceil(4));
+            let mut own = line[usize::from(x & 3)][usize::from(x / 4)..].iter();
+            self.select(x);
+            self.lane::<1>(x, y, len, |row| {
+                row.fill(|| own.next().copied().unwrap_or(0))
+            });
+        }
+    }
 }
+
+/// A line of the screen in RAM: pixel x is `line[x & 3][x / 4]`.
+pub type Line<'a> = [&'a mut [u8; STRIDE]; 4];
 
 /// The last screen column of a row, checked to lie in the picture.
 pub(crate) fn check_row(x: u16, y: u16, len: u16) -> u16 {
@@ -83,8 +106,8 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
     pub fn over(bytes: &'a mut [u8]) -> Self {
         let len = bytes.len().div_ceil(STEP);
         assert!(len <= usize::from(u16::MAX), "{len} pixels in a lane");
-        // SAFETY: the slice spans the lane from its first byte to its last, and its exclusive borrow
-        // lives as long as the lane.
+        // SAFETY: the slice spans the lane from its first byte to its last, and its exclusive
+        // borrow lives as long as the lane.
         unsafe { Self::new(NonNull::from(bytes).cast(), len as u16) }
     }
 
@@ -117,6 +140,30 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         self.base.as_ptr()
     }
 
+    /// The `pixels` from pixel `first` on.
+    ///
+    /// # Panics
+    /// If there are not so many.
+    #[inline]
+    pub fn part(&mut self, first: u16, pixels: u16) -> Lane<'_, STEP> {
+        assert!(
+            first <= self.len && pixels <= self.len - first,
+            "{pixels} of {} pixels from pixel {first} on",
+            self.len
+        );
+        // The last pixel may be the last byte of what is lent: no pointer goes past it.
+        let base = match first < self.len {
+            // SAFETY: `first < len`, so by the contract of `new` the address is inside.
+            true => unsafe { self.base.add(usize::from(first) * STEP) },
+            false => self.base,
+        };
+        Lane {
+            base,
+            len: pixels,
+            lent: PhantomData,
+        }
+    }
+
     /// The first `pixels`, and those after them.
     ///
     /// # Panics
@@ -147,8 +194,8 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         (first, second)
     }
 
-    /// Lanes of `pixels` pixels each, from the first pixel on. Those at the end that do not fill one
-    /// are in none.
+    /// Lanes of `pixels` pixels each, from the first pixel on. Those at the end that do not fill
+    /// one are in none.
     ///
     /// # Panics
     /// If `pixels` is 0.
@@ -159,8 +206,9 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         (0..usize::from(len / pixels) * step)
             .step_by(step)
             .map(move |offset| {
-                // SAFETY: this many lanes fit in the length, so by the contract of `new` the address
-                // is inside, and so are the `pixels` from there on, which are in no other lane.
+                // SAFETY: this many lanes fit in the length, so by the contract of `new` the
+                // address is inside, and so are the `pixels` from there on, which are in no other
+                // lane.
                 let base = unsafe { base.add(offset) };
                 let len = pixels;
                 Self { base, len, lent }

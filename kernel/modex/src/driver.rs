@@ -88,7 +88,7 @@ impl Drawn {
 
     /// Adds the pixel columns `first..=last`, lines `top..bottom`, all of them in the picture.
     #[inline]
-    fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
+    pub(crate) fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
         for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
             self.add_to(group, top, bottom);
         }

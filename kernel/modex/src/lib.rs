@@ -32,7 +32,7 @@ pub mod registers;
 mod window;
 
 pub use bus::{Bus, Purpose};
-pub use column::{Column, Destination, Lane};
+pub use column::{Column, Destination, Lane, Line};
 pub use count::{Counted, Counts, Tally};
 pub use driver::{Canvas, ModeX, Palette, Readback, Rgb6};
 pub use offscreen::Offscreen;

@@ -1,7 +1,8 @@
 //! A page in RAM to draw on, and to present.
 
+use crate::column::check_row;
 use crate::driver::Drawn;
-use crate::{Destination, HEIGHT, Lane, PlanarBuffer};
+use crate::{Destination, HEIGHT, Lane, Line, PlanarBuffer};
 
 /// A page in RAM that knows what it was drawn on.
 ///
@@ -78,5 +79,11 @@ impl Destination for Offscreen {
     ) {
         self.drawn.lane::<STEP>(x, y, len);
         self.page.lane(x, y, len, draw);
+    }
+
+    fn line(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Line<'_>)) {
+        let last = check_row(x, y, len);
+        self.drawn.add(x, last, y, y + 1);
+        self.page.line(x, y, len, draw);
     }
 }

@@ -4,7 +4,7 @@ use core::ptr::NonNull;
 
 use crate::column::check_row;
 use crate::driver::check_lane;
-use crate::{Destination, HEIGHT, Lane, PAGE_BYTES, STRIDE, WIDTH};
+use crate::{Destination, HEIGHT, Lane, Line, PAGE_BYTES, STRIDE, WIDTH};
 
 /// Four planes of one page: pixel (x, y) is `planes[x & 3][80 y + x / 4]`.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -67,6 +67,15 @@ impl Destination for PlanarBuffer {
         // pixels right: the lane lies in the plane from its first byte to its last. The exclusive
         // borrow of the planes lives until `draw` returns.
         draw(unsafe { Lane::new(base, len) });
+    }
+
+    fn line(&mut self, x: u16, y: u16, len: u16, draw: impl FnOnce(Line<'_>)) {
+        check_row(x, y, len);
+        draw(
+            self.planes
+                .each_mut()
+                .map(|plane| &mut plane.as_chunks_mut().0[usize::from(y)]),
+        );
     }
 
     fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {

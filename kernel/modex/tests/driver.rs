@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use modex::registers::*;
 use modex::{
-    Bus, Counted, Destination, HEIGHT, Lane, ModeX, Offscreen, PAGE_BYTES, PAGES, PLANE_BYTES,
-    PlanarBuffer, STRIDE, Tally, WIDTH, Window,
+    Bus, Counted, Destination, HEIGHT, Lane, Line, ModeX, Offscreen, PAGE_BYTES, PAGES,
+    PLANE_BYTES, PlanarBuffer, STRIDE, Tally, WIDTH, Window,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -404,16 +404,62 @@ fn a_row_takes_one_mask_and_one_store_a_pixel() {
     }
 }
 
+/// Of a line in RAM the row's pixels are stored, plane by plane, and no other.
+#[test]
+fn a_row_of_a_line_takes_a_mask_a_plane_and_one_store_a_pixel() {
+    let background = [9; HEIGHT];
+    for (x, y, len) in rows() {
+        let mut expected = PlanarBuffer::new();
+        expected.clear(&background);
+        let (mut flat, mut offscreen) = (expected.clone(), Offscreen::new());
+        for (x, colour) in (x..x + len).zip(100u16..) {
+            expected.column(x, y, 1, |pixel| pixel.fill(|| colour as u8));
+        }
+        let draw = |line: Line<'_>| {
+            for (x, colour) in (usize::from(x)..usize::from(x + len)).zip(100u16..) {
+                line[x & 3][x / 4] = colour as u8;
+            }
+        };
+        flat.line(x, y, len, draw);
+        assert!(flat == expected, "in RAM, {len} from ({x}, {y})");
+        offscreen.begin(&background);
+        offscreen.line(x, y, len, draw);
+        assert!(offscreen.page() == &expected, "to be presented");
+        // It is known to be drawn on.
+        offscreen.begin(&background);
+        let mut bare = PlanarBuffer::new();
+        bare.clear(&background);
+        assert!(offscreen.page() == &bare, "erased");
+
+        let mut recorder = Recorder::new();
+        let mut card = ModeX::set(Counted::new(&mut recorder), &BLACK).unwrap();
+        card.begin(&background).line(x, y, len, draw);
+        let draw = card.bus().counts().draw;
+        let planes = u64::from(len.min(4));
+        assert_eq!((draw.map_mask, draw.ports), (planes, planes));
+        assert_eq!((draw.stores, draw.bytes), (len.into(), len.into()));
+        assert!(page(card.bus().inner(), 1) == expected, "on the card");
+    }
+}
+
 #[test]
 fn a_row_that_leaves_the_picture_is_refused() {
     let refused = |x, y, len| {
         let ram = std::panic::catch_unwind(|| PlanarBuffer::new().row(x, y, len, || 0));
+        let line = std::panic::catch_unwind(|| PlanarBuffer::new().line(x, y, len, |_| {}));
         let card = std::panic::catch_unwind(|| {
             let mut recorder = Recorder::new();
             let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
             card.begin(&[0; HEIGHT]).row(x, y, len, || 0);
         });
+        let card_line = std::panic::catch_unwind(|| {
+            let mut recorder = Recorder::new();
+            let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
+            card.begin(&[0; HEIGHT]).line(x, y, len, |_| {});
+        });
         assert_eq!(ram.is_err(), card.is_err());
+        assert_eq!(line.is_err(), card_line.is_err());
+        assert_eq!(ram.is_err(), line.is_err());
         ram.is_err()
     };
     assert!(!refused(319, 239, 1) && !refused(0, 0, 320));
@@ -492,8 +538,8 @@ fn every_write_is_counted_once_for_its_purpose() {
     );
 }
 
-/// Whatever is drawn, in whatever shape: a window shows what a whole picture has in its columns, and
-/// touches no other.
+/// Whatever is drawn, in whatever shape: a window shows what a whole picture has in its columns,
+/// and touches no other.
 #[test]
 fn a_window_shows_its_columns_and_nothing_else() {
     let seed = fastrand::u64(..);

@@ -280,9 +280,9 @@ impl Map {
         if area == 0 {
             return None;
         }
-        // One division. Off by less than 1, it moves a gradient by less than 2^42 2^-38, 2^-28 texel
-        // a pixel, and over 2^10 pixels each way a coordinate by 2^-17; the gradients' own last
-        // places and the origin's are less than another 2^-20.
+        // One division. Off by less than 1, it moves a gradient by less than 2^42 2^-38, 2^-28
+        // texel a pixel, and over 2^10 pixels each way a coordinate by 2^-17; the gradients' own
+        // last places and the origin's are less than another 2^-20.
         let over = (1 << 62) / area;
         let gradient = |at: [i32; 3]| {
             let change = (at[1] - at[0], at[2] - at[0]);
@@ -309,6 +309,24 @@ impl Map {
             last,
             inside: clear(u, last.0) && clear(v, last.1),
         })
+    }
+
+    /// The map with these values at the centre of pixel (0, 0), and these steps to the right and
+    /// down; 32 fraction bits, steps within +-2^40. `inside` tells that no pixel is as near the
+    /// texture's border as 4 2^-16 texel.
+    pub(crate) fn of(maps: [(i64, i64, i64); 2], texture: &Texture<'_>, inside: bool) -> Self {
+        let [u, v] = maps.map(|(origin, right, down)| Gradient {
+            origin,
+            right,
+            down,
+            step: (down / (1 << 16)) as i32,
+        });
+        Self {
+            u,
+            v,
+            last: texture.last(),
+            inside,
+        }
     }
 
     /// The walk down a run of [`coverage::spans`] or [`coverage::columns`].

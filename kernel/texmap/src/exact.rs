@@ -1,4 +1,5 @@
-//! The exact perspective mapper: the quotient's texel at every pixel, and no rounding but the floor.
+//! The exact perspective mapper: the quotient's texel at every pixel, and no rounding but the
+//! floor.
 //!
 //! Legal input: a plane as [`Plane::new`] makes it, a column on the screen. Error: none against the
 //! quantised forms; what quantising them does is bounded in [`crate::plane`].
@@ -13,10 +14,10 @@
 //! # Why most pixels are not divided
 //!
 //! Where the column bends little enough a linear estimate comes first, and a margin that
-//! [`crate::bounds`] says it is never off by. If the estimate less the margin and the estimate and the
-//! margin have the same floor, so has the quotient between them: that *is* the texel. Only where they
-//! have not, which is within the margin of a texel's border, the pixel is divided. At [`MARGIN`] that
-//! is one in 8 at most, where the texture is passed evenly.
+//! [`crate::bounds`] says it is never off by. If the estimate less the margin and the estimate and
+//! the margin have the same floor, so has the quotient between them: that *is* the texel. Only
+//! where they have not, which is within the margin of a texel's border, the pixel is divided. At
+//! [`MARGIN`] that is one in 8 at most, where the texture is passed evenly.
 //!
 //! [`Plane::new`]: crate::Plane::new
 
@@ -24,7 +25,7 @@ use modex::Column;
 
 use crate::Texture;
 use crate::bounds::Bend;
-use crate::plane::{Walk, texel};
+use crate::plane::{self, Walk};
 use crate::runs::{Cuts, Pieces};
 
 /// The most that an estimate may be off, in 2^-16 texel.
@@ -47,20 +48,24 @@ pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_
     let last = (first..len).rev().find(needs_no_clamp);
     let end = last.map_or(first, |last| last + 1);
 
-    let clamped = |[a, b, c]: [i64; 3]| {
-        let (u, v) = (texel(a, c, width), texel(b, c, height));
-        texture.texel(u.into(), v.into())
-    };
     let (above, rest) = column.split(first);
     let (inside, below) = rest.split(end - first);
-    above.fill(|| clamped(walk.next()));
+    above.fill(|| texel(texture, walk.next()));
     let pixels = inside.len();
     match estimate(texture, &walk, pixels) {
         Some((pieces, margin)) => estimated(texture, walk, pieces, margin, inside),
         None => divided(texture, walk, inside),
     }
     walk.at = walk.after(pixels);
-    below.fill(|| clamped(walk.next()));
+    below.fill(|| texel(texture, walk.next()));
+}
+
+/// The texel at any pixel.
+#[inline]
+pub(crate) fn texel(texture: &Texture<'_>, [a, b, c]: [i64; 3]) -> u8 {
+    let u = plane::texel(a, c, texture.width());
+    let v = plane::texel(b, c, texture.height());
+    texture.texel(u.into(), v.into())
 }
 
 /// The texel at a pixel that needs no clamp.

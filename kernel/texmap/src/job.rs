@@ -2,12 +2,14 @@
 
 use core::iter;
 
-use modex::{Column, Destination};
+use modex::{Column, Destination, Lane};
 
 use crate::coverage::Axis;
 use crate::loops::{Draw, DrawLinear, Loop};
-use crate::runs::{self, Pieces, Steps};
-use crate::{Texture, affine, exact, free, level, plane};
+use crate::places::{Part, Places, Row};
+use crate::runs::{self, Cuts, Pieces, Steps};
+use crate::within::Tolerance;
+use crate::{Texture, adaptive, affine, exact, free, level, plane};
 
 /// How a run's texture is walked: starts and steps, one mapper's or another's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,6 +22,8 @@ pub enum Walk {
     Linear(plane::Walk, Pieces),
     /// [`Steps::quadratic`].
     Quadratic(plane::Walk, Pieces),
+    /// [`adaptive`].
+    Adaptive(plane::Walk, Tolerance),
     /// [`level`]: one coordinate stays.
     Wall(level::Wall),
     /// [`free`]: the run leaves its row or column.
@@ -32,10 +36,12 @@ pub enum Rows {
     /// Address, plane and texel anew for every pixel.
     Multiply,
     /// Stepped, the plane selected for every pixel.
-    #[default]
     Steps,
     /// In four passes, one a plane.
     Passes,
+    /// All texels one after the other, and then the planes: see [`Destination::line`].
+    #[default]
+    Lines,
 }
 
 /// How runs are drawn.
@@ -53,6 +59,7 @@ impl Style {
         Tools {
             column: self.affine.draw(),
             linear: self.affine.draw_linear(),
+            extract: self.affine == Loop::Extract && Loop::Extract.is_tuned_here(),
             rows: self.rows,
         }
     }
@@ -62,9 +69,11 @@ impl Style {
 #[derive(Debug)]
 pub(crate) struct Tools {
     /// Draws affine columns.
-    column: Draw,
+    pub column: Draw,
     /// Draws columns in linear pieces.
     linear: DrawLinear,
+    /// Whether affine rows are drawn with the CPU's bit-extract.
+    pub extract: bool,
     rows: Rows,
 }
 
@@ -112,11 +121,45 @@ impl Job {
     /// Each pixel with its coordinates in the texture, 16.16: the clear twin of [`Job::draw`].
     /// The exact mapper's are rounded down.
     pub fn pixels(&self, texture: &Texture<'_>, mut sink: impl FnMut((u16, u16), (i32, i32))) {
-        let mut coordinates = Coordinates::new(self, texture);
-        for i in 0..self.len {
-            let place = self.place(i);
-            sink(place, coordinates.next());
+        let mut pixels = |job: &Self| {
+            let mut coordinates = Coordinates::new(job, texture);
+            for i in 0..job.len {
+                let place = job.place(i);
+                sink(place, coordinates.next());
+            }
+        };
+        let Walk::Adaptive(walk, tolerance) = &self.walk else {
+            return pixels(self);
+        };
+        let mut part = |first, len, walk| {
+            let (x, y) = self.place(first);
+            pixels(&Self {
+                x,
+                y,
+                len,
+                walk,
+                ..*self
+            });
+        };
+        let mut pieces = self.pieces(walk, *tolerance, texture);
+        for piece in pieces.by_ref() {
+            part(piece.first, piece.len, Walk::Affine(piece.walk));
         }
+        if let Some((first, len, walk)) = pieces.rest() {
+            part(first, len, Walk::Exact(walk));
+        }
+    }
+
+    /// The pieces of a run that is adaptive.
+    #[inline]
+    fn pieces(
+        &self,
+        walk: &plane::Walk,
+        tolerance: Tolerance,
+        texture: &Texture<'_>,
+    ) -> adaptive::Pieces {
+        let row = (self.axis == Axis::Right).then_some(self.x);
+        adaptive::Pieces::new(walk, self.len, row, tolerance, texture)
     }
 
     /// Whether the run keeps to one column.
@@ -126,8 +169,8 @@ impl Job {
 
     /// The `len` pixels of the run from pixel `first` on.
     ///
-    /// Pieces begin anew at its first pixel. They are no longer than the whole run's, and lie within
-    /// it: no [bound](crate::bounds) is another one.
+    /// Pieces begin anew at its first pixel. They are no longer than the whole run's, and lie
+    /// within it: no [bound](crate::bounds) is another one.
     pub(crate) fn part(&self, first: u16, len: u16) -> Self {
         let (x, y) = self.place(first);
         let after = |mut walk: plane::Walk| {
@@ -139,6 +182,7 @@ impl Job {
             Walk::Exact(walk) => Walk::Exact(after(walk)),
             Walk::Linear(walk, pieces) => Walk::Linear(after(walk), pieces),
             Walk::Quadratic(walk, pieces) => Walk::Quadratic(after(walk), pieces),
+            Walk::Adaptive(walk, tolerance) => Walk::Adaptive(after(walk), tolerance),
             Walk::Wall(wall) => Walk::Wall(wall.after(first)),
             Walk::Free(walk) => Walk::Free(walk.after(first)),
         };
@@ -194,9 +238,9 @@ impl Job {
                     destination.select(job.x);
                     job.draw_column(tools, texture, destination);
                 }
-                Axis::Right => job.draw_row(tools.rows, texture, destination),
+                Axis::Right => job.draw_row(tools, texture, destination),
             }),
-            _ => self.draw_row(tools.rows, texture, destination),
+            _ => self.draw_row(tools, texture, destination),
         }
     }
 
@@ -252,9 +296,9 @@ impl Job {
             Walk::Free(walk) => self.straight(walk, |job| match job.axis {
                 Axis::Down if job.x & 3 != plane => {}
                 Axis::Down => job.draw_column(tools, texture, destination),
-                Axis::Right => job.draw_part(plane, texture, destination),
+                Axis::Right => job.draw_part(plane, tools, texture, destination),
             }),
-            _ => self.draw_part(plane, texture, destination),
+            _ => self.draw_part(plane, tools, texture, destination),
         }
     }
 
@@ -300,14 +344,18 @@ impl Job {
                 runs::quadratic(texture, walk, self.len, pieces, column);
             }
             &Walk::Exact(walk) => exact::column(texture, walk, self.len, column),
+            Walk::Adaptive(walk, tolerance) => {
+                let pieces = self.pieces(walk, *tolerance, texture);
+                adaptive::draw::<1>(pieces, 0, texture, tools, column);
+            }
             Walk::Wall(wall) => wall.column(texture, column),
             Walk::Affine(_) | Walk::Free(_) => unreachable!("they are drawn elsewhere"),
         }
     }
 
     /// A row.
-    fn draw_row(&self, rows: Rows, texture: &Texture<'_>, destination: &mut impl Destination) {
-        match (rows, self.walk) {
+    fn draw_row(&self, tools: &Tools, texture: &Texture<'_>, destination: &mut impl Destination) {
+        match (tools.rows, self.walk) {
             (Rows::Multiply, Walk::Affine(walk)) => {
                 for i in 0..self.len {
                     let (u, v) = (
@@ -319,50 +367,83 @@ impl Job {
                     });
                 }
             }
-            (Rows::Passes, Walk::Affine(_)) => {
+            (Rows::Steps, Walk::Affine(mut walk)) => {
+                destination.row(self.x, self.y, self.len, || texel(texture, walk.next()));
+            }
+            (Rows::Passes, _) => {
                 for plane in 0..4u16 {
-                    let first = plane.wrapping_sub(self.x) & 3;
-                    if first < self.len {
+                    if plane.wrapping_sub(self.x) & 3 < self.len {
                         destination.select(plane);
-                        self.draw_part(plane, texture, destination);
+                        self.draw_part(plane, tools, texture, destination);
                     }
                 }
             }
-            (_, Walk::Affine(mut walk)) => {
-                destination.row(self.x, self.y, self.len, || texel(texture, walk.next()));
-            }
-            _ => {
-                let mut coordinates = Coordinates::new(self, texture);
-                destination.row(self.x, self.y, self.len, || {
-                    texel(texture, Some(coordinates.next()))
-                });
-            }
+            _ => destination.line(self.x, self.y, self.len, |line| {
+                self.fill_row::<1>(0, tools, texture, Row { line, x: self.x });
+            }),
         }
     }
 
     /// The pixels of a row in one plane, which is selected.
-    fn draw_part(&self, plane: u16, texture: &Texture<'_>, destination: &mut impl Destination) {
+    fn draw_part(
+        &self,
+        plane: u16,
+        tools: &Tools,
+        texture: &Texture<'_>,
+        destination: &mut impl Destination,
+    ) {
         let first = plane.wrapping_sub(self.x) & 3;
-        match self.walk {
+        if first < self.len {
+            let len = (self.len - first).div_ceil(4);
+            destination.lane(self.x + first, self.y, len, |row: Lane<'_, 1>| {
+                self.fill_row::<4>(first, tools, texture, row);
+            });
+        }
+    }
+
+    /// Puts the texels of every `STRIDE`th pixel of a row from pixel `first` on into their places.
+    fn fill_row<const STRIDE: u16>(
+        &self,
+        first: u16,
+        tools: &Tools,
+        texture: &Texture<'_>,
+        mut places: impl Places,
+    ) {
+        let len = (self.len - first).div_ceil(STRIDE);
+        match &self.walk {
             Walk::Affine(walk) => {
-                if first < self.len {
-                    let mut walk = walk.every(4, first.into());
-                    let len = (self.len - first).div_ceil(4);
-                    destination.lane::<1>(self.x + first, self.y, len, |row| {
-                        row.fill(|| texel(texture, walk.next()));
-                    });
+                let walk = walk.every(STRIDE.into(), first.into());
+                places.part(0, len).affine(texture, walk, tools);
+            }
+            Walk::Exact(walk) => places
+                .part(0, len)
+                .exact(texture, walk.every(STRIDE, first)),
+            Walk::Adaptive(walk, tolerance) => {
+                let pieces = self.pieces(walk, *tolerance, texture);
+                adaptive::draw::<STRIDE>(pieces, first, texture, tools, places);
+            }
+            Walk::Linear(walk, pieces) => {
+                let mut cuts = Cuts::new(*walk, self.len, *pieces, texture);
+                let (mut place, mut skipped) = (0, first);
+                while place < len {
+                    let piece = cuts.next();
+                    let count = piece.pixels().saturating_sub(skipped).div_ceil(STRIDE);
+                    if count > 0 {
+                        let walk = piece.straight().every(STRIDE.into(), skipped.into());
+                        places.part(place, count).affine(texture, walk, tools);
+                    }
+                    place += count;
+                    skipped = skipped + count * STRIDE - piece.pixels();
                 }
             }
             _ => {
                 let mut coordinates = Coordinates::new(self, texture);
-                for i in 0..self.len {
+                (0..first).for_each(|_| _ = coordinates.next());
+                places.part(0, len).fill(|| {
                     let (u, v) = coordinates.next();
-                    let x = self.x + i;
-                    if x & 3 == plane {
-                        destination
-                            .lane::<1>(x, self.y, 1, |pixel| pixel.fill(|| texture.at(u, v)));
-                    }
-                }
+                    (1..STRIDE).for_each(|_| _ = coordinates.next());
+                    texture.at(u, v)
+                });
             }
         }
     }
@@ -395,6 +476,7 @@ impl Coordinates {
                 Self::Pieces(Steps::quadratic(walk, job.len, pieces, texture))
             }
             Walk::Free(walk) => Self::Free(walk),
+            Walk::Adaptive(..) => unreachable!("its pieces have them"),
         }
     }
 
@@ -419,6 +501,7 @@ impl Coordinates {
 pub struct JobList<const N: usize> {
     jobs: [Job; N],
     len: usize,
+    has_rows: bool,
     /// For each job and plane the next in the chain: see [`ByPlane`].
     next: [[u16; 4]; N],
 }
@@ -472,6 +555,7 @@ impl<const N: usize> JobList<N> {
         Self {
             jobs: [Self::EMPTY; N],
             len: 0,
+            has_rows: false,
             next: [[0; 4]; N],
         }
     }
@@ -484,7 +568,13 @@ impl<const N: usize> JobList<N> {
         let place = self.jobs.get_mut(self.len).ok_or(job)?;
         *place = job;
         self.len += 1;
+        self.has_rows |= job.axis == Axis::Right;
         Ok(())
+    }
+
+    /// Whether any of the jobs goes along a row.
+    pub(crate) fn has_rows(&self) -> bool {
+        self.has_rows
     }
 
     /// The jobs, in the order in which they came.
@@ -512,6 +602,7 @@ impl<const N: usize> JobList<N> {
     /// Empties the list.
     pub fn clear(&mut self) {
         self.len = 0;
+        self.has_rows = false;
     }
 }
 

@@ -11,6 +11,7 @@
 #![no_std]
 #![deny(unsafe_code)]
 
+pub mod adaptive;
 pub mod affine;
 mod along;
 pub mod bounds;
@@ -21,6 +22,7 @@ mod job;
 pub mod level;
 pub mod loops;
 mod mapper;
+mod places;
 pub mod plane;
 mod polygon;
 mod renderer;

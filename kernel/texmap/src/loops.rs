@@ -31,8 +31,9 @@
 use modex::Column;
 
 use crate::affine::Walk;
+use crate::places::Part;
 use crate::{Texture, plane, runs};
-use steps::{Address, Crossed, Halves, Joint, Pair};
+use steps::{Address, Crossed, Halves, Joint, Pair, Registers};
 
 mod steps;
 #[cfg(target_arch = "x86_64")]
@@ -197,6 +198,23 @@ impl Loop {
             let inline =
                 |texture: &Texture<'_>, walk, pixels: Column<'_>| draw(texture, &walk, pixels);
             runs::linear(texture, walk, pieces, draw, inline, column);
+        }
+    }
+
+    /// Puts the texels of a walk along a row, which are any loop's, into their places; `extract`
+    /// tells whether by the instructions of [`Loop::Extract`], which the CPU must have.
+    #[inline(always)]
+    pub(crate) fn along(texture: &Texture<'_>, mut walk: Walk, extract: bool, places: impl Part) {
+        let texels = texture.texels();
+        match Joint::new(texture, walk, 0) {
+            #[cfg(target_arch = "x86_64")]
+            Some(joint) if extract => tuned::along(texels, joint, places),
+            Some(mut joint) => places.fill(|| texels[joint.next()]),
+            None => places.fill(|| {
+                let (u, v) = (walk.u, walk.v);
+                walk = walk.every(1, 1);
+                texture.at(u, v)
+            }),
         }
     }
 

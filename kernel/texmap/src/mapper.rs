@@ -54,7 +54,7 @@ pub enum Mapper {
     Free,
     /// Affine where a column or row has one depth, otherwise exact.
     Level,
-    /// For every polygon and column the cheapest way that keeps to an error.
+    /// For every polygon and run the cheapest way that keeps to an error.
     Within(Tolerance),
 }
 
@@ -192,27 +192,27 @@ impl Mapper {
         (
             "within-1",
             Self::Within(Tolerance::part(0)),
-            "perspective; for each face and column the cheapest way within a texel",
+            "perspective; for each face and run the cheapest way within a texel",
         ),
         (
             "within-1/2",
             Self::Within(Tolerance::part(1)),
-            "perspective; for each face and column the cheapest way within 1/2 texel",
+            "perspective; for each face and run the cheapest way within 1/2 texel",
         ),
         (
             "within-1/4",
             Self::Within(Tolerance::part(2)),
-            "perspective; for each face and column the cheapest way within 1/4 texel",
+            "perspective; for each face and run the cheapest way within 1/4 texel",
         ),
         (
             "within-1/16",
             Self::Within(Tolerance::part(4)),
-            "perspective; for each face and column the cheapest way within 1/16 texel",
+            "perspective; for each face and run the cheapest way within 1/16 texel",
         ),
         (
             "within-1/256",
             Self::Within(Tolerance::part(8)),
-            "perspective; for each face and column the cheapest way within 1/256 texel",
+            "perspective; for each face and run the cheapest way within 1/256 texel",
         ),
         (
             "exact",
@@ -253,7 +253,7 @@ impl Mapper {
     pub fn style(self) -> Style {
         let mut style = Style {
             affine: Loop::fastest(),
-            ..Style::default()
+            rows: Rows::Lines,
         };
         match self {
             Self::Rows(rows) => style.rows = rows,
@@ -294,15 +294,32 @@ impl Mapper {
             sink(Job::new(axis, line, first, len, number, walk));
         };
         let polygon = face.polygon;
-        if let Self::Affine(drawn_by) = self
-            && let Some(map) = Map::new(polygon, texture)
-        {
-            return spans(Axis::Down, polygon, |run| {
+        let drawn_by = self.style().affine;
+        let mut by_map = |map: &Map| {
+            spans(Axis::Down, polygon, |run| {
                 let walk = Walk::Affine(drawn_by.walk(map.walk(&run)));
                 add(Axis::Down, run.line, run.first, run.len, walk);
-            });
+            })
+        };
+        match self {
+            Self::Affine(_) => {
+                if let Some(map) = Map::new(polygon, texture) {
+                    return by_map(&map);
+                }
+            }
+            Self::Within(tolerance) => {
+                let within = Within::new(polygon, face.plane(), texture, tolerance);
+                if let Some(map) = within.map() {
+                    return by_map(map);
+                }
+                let axis = within.axis();
+                let mut walk = within.walks(texture);
+                return spans(axis, polygon, |run| {
+                    add(axis, run.line, run.first, run.len, walk(&run));
+                });
+            }
+            _ => {}
         }
-        let drawn_by = self.style().affine;
         let mut by_sides = |axis, rule: fn(&Sides, &Run) -> affine::Walk| {
             let sides = Sides::new(polygon, texture, axis)?;
             runs(axis, polygon, |run| {
@@ -318,15 +335,6 @@ impl Mapper {
             _ => {}
         }
         let plane = face.plane();
-        if let Self::Within(tolerance) = self {
-            let within = Within::new(polygon, plane, texture, tolerance);
-            return spans(Axis::Down, polygon, |run| {
-                let place = (run.line, run.first);
-                within.parts(place, run.len, texture, &mut |first, len, walk| {
-                    add(Axis::Down, run.line, first, len, walk);
-                });
-            });
-        }
         let axis = match self {
             Self::Nearer if plane.c.right.abs() < plane.c.down.abs() => Axis::Right,
             _ => Axis::Down,

@@ -109,6 +109,14 @@ impl Walk {
         [0, 1, 2].map(|k| self.at[k] + self.step[k] * i64::from(pixels))
     }
 
+    /// The walk from pixel `pixels` of this one on, in steps of `stride` pixels.
+    pub(crate) fn every(&self, stride: u16, pixels: u16) -> Self {
+        Self {
+            at: self.after(pixels),
+            step: self.step.map(|step| step * i64::from(stride)),
+        }
+    }
+
     /// The forms here; then it is a pixel further.
     pub(crate) fn next(&mut self) -> [i64; 3] {
         let here = self.at;
@@ -130,33 +138,37 @@ impl Plane {
     /// # Panics
     /// In a build with overflow checks, if a position or the focal length is out of its range.
     pub fn new(anchors: &[Anchor; 3], focal_length: i32) -> Self {
-        let [v0, v1, v2] = anchors.map(|anchor| anchor.position.map(i128::from));
-        let weights = [cross(v1, v2), cross(v2, v0), cross(v0, v1)];
-        let sum = |factors: [i128; 3]| {
-            [0, 1, 2].map(|k| (0..3).map(|i| factors[i] * weights[i][k]).sum::<i128>())
-        };
-        // c has the sixteen bits that u and v bring into a and b.
-        let vectors = [
-            sum(anchors.map(|anchor| i128::from(anchor.u))),
-            sum(anchors.map(|anchor| i128::from(anchor.v))),
-            sum([1 << 16; 3]),
-        ];
+        // Positions have 24 bits, what is made of two of them 50: only their sums need more than
+        // 64.
+        let [v0, v1, v2] = anchors.map(|anchor| anchor.position.map(i64::from));
+        let mut weights = [cross(v1, v2), cross(v2, v0), cross(v0, v1)];
         // The sign of the volume is that of c before the eye.
-        let volume: i128 = (0..3).map(|k| v0[k] * weights[0][k]).sum();
-        let sign = if volume < 0 { -1 } else { 1 };
-        let forms = vectors.map(|vector| on_screen(vector.map(|k| sign * k), focal_length));
-        let [a, b, c] = forms.map(|form| largest(&form));
-        let bits = 128 - a.max(b).max(c << 8).leading_zeros();
+        if dot(v0, weights[0]) < 0 {
+            weights = weights.map(|weight| weight.map(|k| -k));
+        }
+        let [x, y, z] = [0, 1, 2].map(|k| weights.map(|weight| weight[k]));
+        let [u, v] = [anchors.map(|a| a.u.into()), anchors.map(|a| a.v.into())];
+        // c has the sixteen bits that u and v bring into a and b.
+        let one = [1 << 16; 3];
+        let a = [dot(u, x), dot(u, y), dot(u, z)];
+        let b = [dot(v, x), dot(v, y), dot(v, z)];
+        let c = [dot(one, x), dot(one, y), dot(one, z)];
+        let [a_most, b_most, c_most] = [a, b, c].map(|vector| largest(vector, focal_length));
+        let bits = 128 - a_most.max(b_most).max(c_most << 8).leading_zeros();
         let shift = bits.saturating_sub(BITS);
-        let [a, b, c] = forms.map(|form| {
-            let [origin, right, down] = form.map(|n| cut(n, shift));
+        let form = |vector| {
+            let [origin, right, down] = on_screen(vector, focal_length);
             Form {
-                origin,
-                right,
-                down,
+                origin: cut(origin, shift),
+                right: cut(right, shift),
+                down: cut(down, shift),
             }
-        });
-        Self { a, b, c }
+        };
+        Self {
+            a: form(a),
+            b: form(b),
+            c: form(c),
+        }
     }
 }
 
@@ -176,8 +188,8 @@ pub fn texel(n: i64, c: i64, size: u16) -> u16 {
     }
 }
 
-/// The coordinate n / c in a texture of `size` texels, 16.16 and rounded down, inside the texture as
-/// [`texel`] is.
+/// The coordinate n / c in a texture of `size` texels, 16.16 and rounded down, inside the texture
+/// as [`texel`] is.
 pub fn coordinate(n: i64, c: i64, size: u16) -> i32 {
     let last = (i64::from(size) << 16) - 1;
     if n < 0 {
@@ -189,7 +201,12 @@ pub fn coordinate(n: i64, c: i64, size: u16) -> i32 {
     }
 }
 
-fn cross(a: [i128; 3], b: [i128; 3]) -> [i128; 3] {
+fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
+    let product = |k: usize| i128::from(a[k]) * i128::from(b[k]);
+    product(0) + product(1) + product(2)
+}
+
+fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
     [
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -199,6 +216,7 @@ fn cross(a: [i128; 3], b: [i128; 3]) -> [i128; 3] {
 
 /// `vector . d` as a form. The centre of pixel (x, y) is at (x + 1/2, y + 1/2), and the middle of
 /// the screen is the corner between four pixels: twice d is whole.
+#[inline(always)]
 pub(crate) fn on_screen(vector: [i128; 3], focal_length: i32) -> Exact {
     let [i, j, k] = vector;
     let (left, top) = (1 - WIDTH as i128, 1 - HEIGHT as i128);
@@ -209,17 +227,18 @@ pub(crate) fn on_screen(vector: [i128; 3], focal_length: i32) -> Exact {
     ]
 }
 
-/// The largest magnitude of a form on the screen: that of a corner.
-fn largest(form: &Exact) -> u128 {
-    let [origin, right, down] = form;
-    let (last_x, last_y) = (WIDTH as i128 - 1, HEIGHT as i128 - 1);
-    let corners = [(0, 0), (last_x, 0), (0, last_y), (last_x, last_y)];
-    let at = |(x, y): (i128, i128)| (origin + right * x + down * y).unsigned_abs();
-    corners.into_iter().map(at).max().unwrap_or(0)
+/// The largest magnitude of `vector . d` on the screen, that of a corner: twice it is what the
+/// middle has, and what it changes by from there to the last centres.
+#[inline(always)]
+fn largest([i, j, k]: [i128; 3], focal_length: i32) -> u128 {
+    let middle = 2 * i128::from(focal_length) * k;
+    let (right, down) = ((WIDTH as i128 - 1) * i, (HEIGHT as i128 - 1) * j);
+    middle.unsigned_abs() + right.unsigned_abs() + down.unsigned_abs()
 }
 
-/// `n / 2^shift`, rounded to nearest, half up.
+/// `n / 2^shift`, rounded to nearest, half up; `shift` is below 64, and the compiler is told so.
+#[inline(always)]
 fn cut(n: i128, shift: u32) -> i64 {
-    let half = (1 << shift) >> 1;
-    ((n + half) >> shift) as i64
+    let half = (1u64 << shift) >> 1;
+    ((n + i128::from(half)) >> (shift % 64)) as i64
 }

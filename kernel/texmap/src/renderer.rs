@@ -31,8 +31,8 @@ pub enum Order {
     Polygons,
     /// All of plane 0, then of 1, 2 and 3: a plane is selected four times a list.
     Planes,
-    /// The same, into a page in RAM that is then presented in wide stores. What is drawn on is the
-    /// caller's to choose.
+    /// The same, into a page in RAM that is then presented in wide stores; a list with rows in it
+    /// as the polygons come. What is drawn on is the caller's to choose.
     Buffer,
 }
 
@@ -80,14 +80,16 @@ impl Order {
         mapper: Mapper,
     ) {
         let tools = mapper.style().tools();
-        match self {
-            Self::Polygons => {
+        // In RAM all planes can be reached at once, and a row is drawn whole.
+        let as_they_come = self == Self::Polygons || self == Self::Buffer && jobs.has_rows();
+        match as_they_come {
+            true => {
                 for job in jobs.jobs() {
                     let texture = &textures[usize::from(job.texture)];
                     job.draw_with(&tools, texture, destination);
                 }
             }
-            Self::Planes | Self::Buffer => {
+            false => {
                 let jobs = jobs.by_plane();
                 for plane in 0..4 {
                     destination.select(plane);
@@ -148,8 +150,8 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
         self.count(mapped);
     }
 
-    /// Adds a face as [`Renderer::face`] does, where `visible`, which knows it by `number`, says that
-    /// it is seen.
+    /// Adds a face as [`Renderer::face`] does, where `visible`, which knows it by `number`, says
+    /// that it is seen.
     ///
     /// # Panics
     /// If there is no such texture.

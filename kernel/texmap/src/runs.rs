@@ -113,6 +113,13 @@ impl Reciprocal {
         (self.shift, self.value)
     }
 
+    /// `rise` / c with 16 more fraction bits than `rise` has, for c of 16 bits or more. Off by 2^-31 of
+    /// itself, and rounded down.
+    #[inline]
+    pub(crate) fn slope(self, rise: i64) -> i64 {
+        ((i128::from(rise) * i128::from(self.value)) >> ((79 - self.shift) % 64)) as i64
+    }
+
     /// n / c in 16.16 for 0 <= n < 256 c: at most the quotient, and less by below 1 + 3/128 units.
     ///
     /// With c' = c 2^shift / 2^32 and n' = n 2^shift / 2^40 the quotient is 2^24 n' / c', and n' <

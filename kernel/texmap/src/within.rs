@@ -1,30 +1,66 @@
 //! The cheapest way that keeps to an error.
 //!
-//! For every polygon, and then for every run, [`crate::bounds`] says how far each way to map it may be
-//! from the quotients; of those that keep to the [`Tolerance`] the cheapest is taken. The quotients
-//! themselves are 0 off, so there always is one.
+//! For every polygon, and then for every run, a closed form says how far each way to map it may be
+//! from the quotients; of those that keep to the [`Tolerance`] the cheapest is taken. From the
+//! cheapest on:
 //!
-//! # Flat
+//! | way | takes | for |
+//! | --- | --- | --- |
+//! | one affine map | nothing but its steps | a polygon |
+//! | a line | two quotients | a run; where all of a polygon's may be lines that is found out once |
+//! | shorter lines | a quotient each, see [`crate::adaptive`] | a run |
+//! | quotients | one for every pixel | what is left of a run |
 //!
-//! A small face, or one that hardly leans, needs no quotient for its runs at all. With f0 = n0 / c0 at a
-//! pixel in the middle of it and A the linear function that has f's value and slopes there,
+//! The quotients are 0 off, so there always is a way.
+//!
+//! Quadratic pieces are none of the ways. One of 16 pixels takes longer than its quotients, and one
+//! of 32 three quarters of their time, where lines of eight take a third. So they could serve only
+//! where such lines err too much and such a curve does not, which is where depth changes by less
+//! than a third over it: of the pixels of random faces those are 1 % at most for errors down to
+//! 1/16, and 7 % for 1/256 (`tests/within.rs` prints and holds the shares).
+//!
+//! # One affine map
+//!
+//! A small face, or one that hardly leans, needs no quotient for its runs at all. For any f0 and c0
+//! the linear function A = f0 + (n - f0 c) / c0 differs from f = n / c by
 //!
 //! ```text
 //! f - A = (A - f0) (c0 - c) / c
 //! ```
 //!
-//! exactly: n = n0 + c0 (A - f0) + f0 (c - c0). Both factors are linear, so over a polygon neither is
-//! larger than at a corner, and c is nowhere less. That is one bound for the polygon; A is three
-//! numbers for each coordinate, and a run takes two multiplications.
+//! exactly. Both factors are linear, so over a polygon neither is larger than at a corner, and c is
+//! nowhere less. With f0 and c0 in the middle of what the corners have, that is a quarter of what f
+//! and c change by, over the least c.
+//!
+//! # Lines
+//!
+//! All columns of a polygon have the same c', and D is linear across them: with the larger one of
+//! the first and the last column one R serves them all ([`crate::bounds`]), and of most columns two
+//! multiplications tell that they may be lines. Where it does not, or a column's end is clamped,
+//! the column's own R is asked for.
+//!
+//! # Columns or rows
+//!
+//! A floor's depth changes fast down its columns and hardly along its rows: lines are many times as
+//! long there. By the closed form a line that keeps to T is sqrt(4 T c^3 / |D c'|) pixels long, c'
+//! being what c changes by along it. So at some of the polygon's places it is asked how long lines
+//! would be either way, and what they would take; the axis that takes less, in sum, is the
+//! polygon's. Which pixels are covered does not depend on it ([`crate::coverage`]).
+//!
+//! A pixel takes about the same either way. In the order of the polygons, and in RAM, a piece of a
+//! row is made once, but plane by plane four times: in between, it counts as [`ROW`] pieces of a
+//! column. So rows are taken where they gain a good deal, and in the order of the planes may still
+//! lose a little. A mapper knows no order, and no pixel depends on one.
 
 use core::fmt;
 
-use crate::bounds::{Above, Bend, passes};
-use crate::coverage::Axis;
-use crate::job;
-use crate::plane::{Plane, Walk};
-use crate::runs::{Pieces, Reciprocal, between};
-use crate::{Texture, Vertex, affine};
+use crate::adaptive::{self, EXACT, LENGTHS, PIECE, Pieces};
+use crate::affine::Map;
+use crate::bounds::{Above, Chords};
+use crate::coverage::{Axis, Run};
+use crate::plane::{Form, Plane, Walk};
+use crate::runs::Reciprocal;
+use crate::{Texture, Vertex, job};
 use modex::{HEIGHT, WIDTH};
 
 /// An error that can be accepted: 2^-16 to 256 texels, in 2^-16 texel.
@@ -83,358 +119,286 @@ impl fmt::Display for Tolerance {
     }
 }
 
-/// What must be to gain by halving a run, as a [`Cost`]: two more bounds to find, and as much again.
-const HALVING: u32 = 2400;
+/// As how many pieces of a column one of a row counts.
+pub const ROW: u32 = 2;
 
-/// A way to map a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Way {
-    /// Linear pieces.
-    Linear(Pieces),
-    /// Quadratic pieces.
-    Quadratic(Pieces),
-    /// A quotient for every pixel.
-    Exact,
+/// What a polygon spans.
+#[derive(Clone, Copy, Debug)]
+struct Span {
+    /// On the screen, in 1/256 pixel: left, top, right, bottom.
+    borders: [i32; 4],
+    /// Whether it lies on the screen.
+    is_whole: bool,
+    /// The middle of its coordinates in the texture.
+    about: [i32; 2],
 }
 
-/// What a way takes, in 1/16 of what a pixel of an affine column takes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Cost {
-    /// For the run.
-    pub run: u32,
-    /// For every piece.
-    pub piece: u32,
-    /// For every pixel.
-    pub pixel: u32,
-}
-
-impl Way {
-    /// All of them, with what they take.
-    pub const ALL: &'static [(Self, Cost); 10] = &{
-        const fn cost(run: u32, piece: u32, pixel: u32) -> Cost {
-            Cost { run, piece, pixel }
-        }
-        const fn linear(steps: u8) -> (Way, Cost) {
-            (Way::Linear(Pieces::Of(steps)), cost(100, 100, 16))
-        }
-        const fn quadratic(pieces: Pieces) -> (Way, Cost) {
-            (Way::Quadratic(pieces), cost(100, 400, 17))
-        }
-        [
-            (Way::Linear(Pieces::Whole), cost(0, 0, 16)),
-            linear(64),
-            linear(32),
-            linear(16),
-            linear(8),
-            linear(4),
-            quadratic(Pieces::Whole),
-            quadratic(Pieces::Of(32)),
-            quadratic(Pieces::Of(16)),
-            (Way::Exact, cost(100, 0, 44)),
-        ]
-    };
-
-    /// What it takes for a run of `len` pixels.
-    pub const fn cost(self, Cost { run, piece, pixel }: Cost, len: u16) -> u32 {
-        let steps = if len > 1 { len as u32 - 1 } else { 1 };
-        let pieces = match self {
-            Self::Linear(Pieces::Of(of)) | Self::Quadratic(Pieces::Of(of)) => {
-                steps.div_ceil(of as u32)
+impl Span {
+    /// That of a polygon, if it spans any of the screen.
+    fn new(polygon: &[Vertex]) -> Option<Self> {
+        let (mut least, mut most) = ([i32::MAX; 4], [i32::MIN; 4]);
+        for vertex in polygon {
+            for (k, at) in [vertex.x, vertex.y, vertex.u, vertex.v]
+                .into_iter()
+                .enumerate()
+            {
+                least[k] = least[k].min(at);
+                most[k] = most[k].max(at);
             }
-            _ => 1,
-        };
-        run + piece * pieces + pixel * len as u32
-    }
-
-    /// The most that it is off, in 2^-16 texel.
-    pub fn bound(self, bend: &Bend) -> u32 {
-        match self {
-            Self::Linear(pieces) => bend.linear(pieces),
-            Self::Quadratic(pieces) => bend.quadratic(pieces),
-            Self::Exact => 0,
         }
-    }
-
-    /// Whether half a run of `len` pixels would gain by a single linear piece in place of this.
-    fn slow(self, len: u16) -> bool {
-        let own = Self::ALL.iter().find(|(way, _)| *way == self);
-        own.is_some_and(|&(way, cost)| {
-            let (whole, least) = Self::ALL[0];
-            way.cost(cost, len) > whole.cost(least, len) + 2 * HALVING
+        let (width, height) = (WIDTH as i32 * 256, HEIGHT as i32 * 256);
+        let [left, top] = [least[0].max(0), least[1].max(0)];
+        let [right, bottom] = [most[0].min(width), most[1].min(height)];
+        (left < right && top < bottom).then(|| Self {
+            borders: [left, top, right, bottom],
+            is_whole: least[0] >= 0 && least[1] >= 0 && most[0] <= width && most[1] <= height,
+            about: [2, 3].map(|k| (least[k] >> 1) + (most[k] >> 1)),
         })
     }
 
-    /// The cheapest for the run that keeps to `tolerance`.
-    pub fn cheapest(bend: &Bend, tolerance: Tolerance) -> Self {
-        let keeps = |way: Self| way.bound(bend) <= tolerance.units();
-        // No other takes less.
-        let (whole, _) = Self::ALL[0];
-        if keeps(whole) {
-            return whole;
-        }
-        // Most ways are refused by two multiplications, before their own bound is asked for.
-        let steps = u64::from(bend.steps());
-        let squared = u64::from(tolerance.units()) * steps * steps;
-        let (chord, curve) = (bend.chord_at_least(), bend.curve_at_least());
-        let hopeless = |way: Self| match way {
-            Self::Linear(Pieces::Of(n)) => chord * u64::from(n).pow(2) > squared,
-            Self::Quadratic(Pieces::Of(n)) => curve * u64::from(n).pow(3) > squared * steps,
-            Self::Quadratic(_) => curve > tolerance.units().into(),
-            _ => false,
-        };
-        let order = &ORDERS[usize::from(bend.steps()).min(HEIGHT - 1)];
-        for &way in order {
-            if !hopeless(way) && keeps(way) {
-                return way;
-            }
-        }
-        Self::Exact
-    }
-}
-
-/// The ways but for the first, the cheapest first, for every number of steps.
-static ORDERS: [[Way; Way::ALL.len() - 1]; HEIGHT] = {
-    let mut orders = [[Way::Exact; Way::ALL.len() - 1]; HEIGHT];
-    let mut steps = 0;
-    while steps < HEIGHT {
-        let order = &mut orders[steps];
-        let mut costs = [0; Way::ALL.len() - 1];
-        let mut way = 1;
-        while way < Way::ALL.len() {
-            let (new, cost) = Way::ALL[way];
-            let cost = new.cost(cost, steps as u16 + 1);
-            let mut place = way - 1;
-            while place > 0 && costs[place - 1] > cost {
-                order[place] = order[place - 1];
-                costs[place] = costs[place - 1];
-                place -= 1;
-            }
-            order[place] = new;
-            costs[place] = cost;
-            way += 1;
-        }
-        steps += 1;
-    }
-    orders
-};
-
-/// The affine map of a whole polygon that touches its plane's quotients in the middle.
-#[derive(Clone, Copy, Debug)]
-struct Flat {
-    /// The pixel in the middle.
-    middle: (i32, i32),
-    /// u and v there, and what they grow by to the right and down: 32 fraction bits.
-    maps: [[i64; 3]; 2],
-    /// What the tolerance leaves for a run's fixed point and its clamped ends, 2^-16 texel.
-    spare: i64,
-    last: (i32, i32),
-}
-
-impl Flat {
-    /// That of a polygon, if there is one that keeps to `tolerance`.
-    fn new(
-        polygon: &[Vertex],
-        plane: &Plane,
-        texture: &Texture<'_>,
-        tolerance: Tolerance,
-    ) -> Option<Self> {
-        let span = |of: fn(&Vertex) -> i32, end: usize| {
-            let end = end as i32 * 256;
-            let (mut least, mut most) = (end, 0);
-            for vertex in polygon {
-                least = least.min(of(vertex));
-                most = most.max(of(vertex));
-            }
-            (least.max(0), most.min(end), 0 <= least && most <= end)
-        };
-        let (left, right, inside_x) = span(|vertex| vertex.x, WIDTH);
-        let (top, bottom, inside_y) = span(|vertex| vertex.y, HEIGHT);
-        if left >= right || top >= bottom {
-            return None;
-        }
-        let middle = ((left + right) >> 9, (top + bottom) >> 9);
-        let at = |form: crate::plane::Form| form.at(middle.0 as u16, middle.1 as u16);
-        let (a, b, c) = (at(plane.a), at(plane.b), at(plane.c));
-        if c <= 0 {
-            return None;
-        }
-        let reciprocal = Reciprocal::new(c);
-        // The middle of what the corners span may lie outside the polygon, and the texture.
-        let quotient = |n: i64| {
-            let inside = n.abs() >> 8 < c;
-            let size = inside.then(|| reciprocal.times(n.abs()))?;
-            Some(if n < 0 { -size } else { size })
-        };
-        let (u, v) = (quotient(a)?, quotient(b)?);
-        let inverse = Above::new(reciprocal);
-        // A slope of more texels a pixel than this has no place in a polygon that is nearly flat.
-        let steep = 1 << 40;
-        let slope = |n: i64, step: i64, c_step: i64| {
-            let d = passes((n, step), (c, c_step));
-            let pace = inverse.pace(d.unsigned_abs());
-            let slope = (pace < steep).then_some(pace as i64)?;
-            Some(if d > 0 { -slope } else { slope })
-        };
-        let map = |at: i32, n: i64, form: crate::plane::Form| {
-            let right = slope(n, form.right, plane.c.right)?;
-            let down = slope(n, form.down, plane.c.down)?;
-            Some([i64::from(at) << 16, right, down])
-        };
-        let maps = [map(u, a, plane.a)?, map(v, b, plane.b)?];
-        // How far A, and c, get from their values in the middle.
-        let (mut change, mut lean) = (0u64, 0u64);
-        let mut corner = |x: i32, y: i32| {
-            let (dx, dy) = (
-                i64::from(x - middle.0 * 256 - 128),
-                i64::from(y - middle.1 * 256 - 128),
-            );
-            let across = |right: i64, down: i64| (right * dx + down * dy).unsigned_abs();
-            for [_, right, down] in maps {
-                change = change.max(across(right, down));
-            }
-            lean = lean.max(across(plane.c.right, plane.c.down));
-        };
-        if inside_x && inside_y {
+    /// Gives `sink` corners between which all of the polygon on the screen lies, from the centre of
+    /// pixel (0, 0), in 1/256 pixel: its own, or those of the borders.
+    #[inline(always)]
+    fn corners(&self, polygon: &[Vertex], mut sink: impl FnMut(i64, i64)) {
+        let mut corner = |x: i32, y: i32| sink((x - 128).into(), (y - 128).into());
+        if self.is_whole {
             for vertex in polygon {
                 corner(vertex.x, vertex.y);
             }
         } else {
+            let [left, top, right, bottom] = self.borders;
             for (x, y) in [(left, top), (right, top), (left, bottom), (right, bottom)] {
                 corner(x, y);
             }
         }
-        let lean = (lean >> 8) as i64 + 1;
-        let least = c - lean;
-        // Where A is off by more than the texture's size nothing is left of the estimate.
-        if least <= 0 || change >= 1 << 50 {
-            return None;
-        }
-        let lean = Above::new(Reciprocal::new(least)).lean(lean);
-        let off = (u128::from(change) * u128::from(lean)) >> 56;
-        let spare = i64::from(tolerance.units()) - off.min(1 << 40) as i64 - 4;
-        (spare > 0).then_some(Self {
-            middle,
-            maps,
-            spare,
-            last: texture.last(),
-        })
     }
 
-    /// The walk down a column's run, unless its own part of the error is too large.
+    /// The first and the last pixel that may have their centre in it, either way.
+    fn pixels(&self) -> [(u16, u16); 2] {
+        let [left, top, right, bottom] = self.borders;
+        let first = |border: i32| (border >> 8) as u16;
+        let last = |border: i32| ((border - 1) >> 8) as u16;
+        [(first(left), first(top)), (last(right), last(bottom))]
+    }
+
+    /// No depth of the polygon on the screen is above the first of these, or below the second; both
+    /// are above zero, or there are none.
     #[inline]
-    fn walk(&self, x: u16, y: u16, len: u16) -> Option<affine::Walk> {
-        let steps = len - 1;
-        let (dx, dy) = (
-            i64::from(x) - i64::from(self.middle.0),
-            i64::from(y) - i64::from(self.middle.1),
-        );
-        let [u, v] = self.maps.map(|[at, right, down]| {
-            let start = at + right * dx + down * dy;
-            (start, start + i64::from(steps) * down, down)
+    fn depths(&self, polygon: &[Vertex], c: &Form) -> Option<(i64, i64)> {
+        let (mut near, mut far) = (i64::MIN, i64::MAX);
+        self.corners(polygon, |x, y| {
+            // 8 more bits than at a pixel's centre.
+            let depth = c.origin * 256 + c.right * x + c.down * y;
+            near = near.max(depth);
+            far = far.min(depth);
         });
-        let inside = |(start, end, _): (i64, i64, i64), last: i32| {
-            let range = 0..=(i64::from(last) << 16) + 0xFFFF;
-            range.contains(&start) && range.contains(&end)
+        let (near, far) = ((near >> 8) + 1, far >> 8);
+        (far > 0).then_some((near, far))
+    }
+}
+
+/// Bits that the nearest depth is cut to for an affine map. All over the screen that moves a
+/// coordinate by less than 256 texels and 560 pixels over the 2^32 that the middle one has at
+/// least: 3 units of 2^-16.
+const DEPTH_BITS: u32 = 34;
+
+/// The affine map of a polygon, if it keeps to `tolerance` in all of it.
+fn flat(
+    polygon: &[Vertex],
+    span: &Span,
+    (near, far): (i64, i64),
+    plane: &Plane,
+    texture: &Texture<'_>,
+    tolerance: Tolerance,
+) -> Option<Map> {
+    // A face that is seen at a glancing angle has no such depths; it is not flat.
+    let cut = (64 - DEPTH_BITS).checked_sub(near.leading_zeros())?;
+    let over_middle = Reciprocal::new((near + far) >> 1 >> cut);
+    // Half of what c changes by, against the least: 32 fraction bits.
+    let lean = Above::new(Reciprocal::new(far)).lean(((near - far) >> 1) + 1);
+    let (mut off, mut inside) = (0, true);
+    let mut gradient = |n: &Form, about: i32, last: i32| {
+        // Any would do; of an illegal face's the product would not fit.
+        let about = i64::from(about.clamp(0, last));
+        let mut wide = 0;
+        let mut slope = |n: i64, c: i64| {
+            let (n, c) = (n >> cut, c >> cut);
+            wide |= (n ^ n >> 63) >> 45 | (c ^ c >> 63) >> 37;
+            over_middle.slope((n << 16).wrapping_sub(about.wrapping_mul(c)))
         };
-        if i64::from(steps) > self.spare {
+        let right = slope(n.right, plane.c.right);
+        let down = slope(n.down, plane.c.down);
+        let origin = slope(n.origin, plane.c.origin);
+        // More texels a pixel than 2^8, or than 2^11 in all, have no place on a face that is flat.
+        wide |= (right ^ right >> 63 | down ^ down >> 63) >> 40;
+        if wide != 0 {
             return None;
         }
-        if inside(u, self.last.0) && inside(v, self.last.1) {
-            let step = |down: i64| (down / (1 << 16)) as i32;
-            return Some(affine::Walk {
-                u: (u.0 >> 16) as i32,
-                v: (v.0 >> 16) as i32,
-                du: step(u.2),
-                dv: step(v.2),
-            });
-        }
-        let mut outside = 0;
-        let mut clamped = |value: i64, last: i32| {
-            let value = value >> 16;
-            let inside = value.clamp(0, last.into());
-            outside = outside.max((value - inside).abs());
-            inside as i32
-        };
-        let from = (clamped(u.0, self.last.0), clamped(v.0, self.last.1));
-        let to = (clamped(u.1, self.last.0), clamped(v.1, self.last.1));
-        (i64::from(steps) + outside < self.spare).then(|| between(from, to, steps))
-    }
+        let (mut low, mut high) = (i64::MAX, i64::MIN);
+        span.corners(polygon, |x, y| {
+            let at = origin + ((right * x + down * y) >> 8);
+            low = low.min(at);
+            high = high.max(at);
+        });
+        let (low, high) = (low >> 16, (high >> 16) + 1);
+        let change = high.max(-low);
+        let bent = (u128::from(change as u64) * u128::from(lean)) >> 32;
+        let (low, high) = (low + about, high + about);
+        // What walks are clamped by, and what the reciprocal's 31 bits leave.
+        let outside = (-low).max(high - i64::from(last)).max(0);
+        off = off.max(bent as i64 + outside + (change >> 28));
+        // 3 2^-16 texel at the first pixel.
+        inside &= low >= 4 && high < i64::from(last) - 4;
+        Some((origin + (about << 16), right, down))
+    };
+    let last = texture.last();
+    let u = gradient(&plane.a, span.about[0], last.0)?;
+    let v = gradient(&plane.b, span.about[1], last.1)?;
+    // The step is cut at every pixel, the first coordinate and the forms once.
+    let [_, top, _, bottom] = span.borders;
+    let rounded = i64::from((bottom - top) >> 8) + 7;
+    (off + rounded <= tolerance.units().into()).then(|| Map::of([u, v], texture, inside))
 }
 
 /// What maps a polygon's runs within an error.
 #[derive(Clone, Copy, Debug)]
 pub struct Within {
     plane: Plane,
-    flat: Option<Flat>,
     tolerance: Tolerance,
+    by: By,
+}
+
+/// How a polygon's runs go, and what is known of all of them.
+#[derive(Clone, Copy, Debug)]
+enum By {
+    /// Columns of one affine map.
+    Map(Map),
+    /// Columns. In none of them the texture passes faster than here; a pixel for each of the
+    /// longest's is taken off the tolerance.
+    Columns(Option<Chords>),
+    /// Rows.
+    Rows,
 }
 
 impl Within {
     /// That of a polygon whose texture lies in `plane`.
+    #[inline]
     pub fn new(
         polygon: &[Vertex],
         plane: Plane,
         texture: &Texture<'_>,
         tolerance: Tolerance,
     ) -> Self {
+        let by = || {
+            let span = Span::new(polygon)?;
+            let depths = span.depths(polygon, &plane.c);
+            let flat = |depths| flat(polygon, &span, depths, &plane, texture, tolerance);
+            if let Some(map) = depths.and_then(flat) {
+                return Some(By::Map(map));
+            }
+            if axis(polygon, &span, &plane, tolerance) == Axis::Right {
+                return Some(By::Rows);
+            }
+            let (near, _) = depths?;
+            let [(left, top), (right, bottom)] = span.pixels();
+            let columns = [left, right].map(|x| Walk::new(&plane, Axis::Down, x, top));
+            let tolerance = tolerance.units().saturating_sub((bottom - top).into());
+            Some(By::Columns(Some(Chords::new(&columns, near, tolerance))))
+        };
         Self {
             plane,
-            flat: Flat::new(polygon, &plane, texture, tolerance),
             tolerance,
+            by: by().unwrap_or(By::Columns(None)),
         }
     }
 
-    /// The walk down a run of `len` pixels from (x, y), if the polygon's affine map is good enough
-    /// for it.
-    #[inline]
-    pub fn flat(&self, x: u16, y: u16, len: u16) -> Option<affine::Walk> {
-        self.flat.as_ref()?.walk(x, y, len)
+    /// The one affine map of all columns, if there is one.
+    pub fn map(&self) -> Option<&Map> {
+        match &self.by {
+            By::Map(map) => Some(map),
+            _ => None,
+        }
     }
 
-    /// Gives `sink` the parts of a run of `len` pixels from (x, y) down: the first pixel of each, its
-    /// pixels, and its walk.
-    #[inline]
-    pub fn parts(
-        &self,
-        (x, y): (u16, u16),
-        len: u16,
-        texture: &Texture<'_>,
-        sink: &mut impl FnMut(u16, u16, job::Walk),
-    ) {
-        if let Some(walk) = self.flat(x, y, len) {
-            return sink(y, len, job::Walk::Affine(walk));
+    /// How the runs go.
+    pub fn axis(&self) -> Axis {
+        match self.by {
+            By::Rows => Axis::Right,
+            _ => Axis::Down,
         }
-        let walk = Walk::new(&self.plane, Axis::Down, x, y);
-        self.cut(walk, y, len, texture, sink);
     }
 
-    /// Those of a run that needs quotients. What suits the far half may be too good for the near one:
-    /// a run that leans far enough, and takes its time, is halved.
-    fn cut(
-        &self,
-        mut walk: Walk,
-        y: u16,
-        len: u16,
-        texture: &Texture<'_>,
-        sink: &mut impl FnMut(u16, u16, job::Walk),
-    ) {
-        let bend = Bend::new(&walk, len, texture);
-        let way = Way::cheapest(&bend, self.tolerance);
-        if way != Way::Linear(Pieces::Whole) && way.slow(len) && bend.leans(len / 2) {
-            let half = len / 2;
-            self.cut(walk, y, half, texture, sink);
-            walk.at = walk.after(half);
-            return self.cut(walk, y + half, len - half, texture, sink);
-        }
-        let walk = match way {
-            Way::Linear(Pieces::Whole) => {
-                let [from, to] = bend.ends;
-                job::Walk::Affine(between(from, to, len - 1))
+    /// Makes the walks of runs, which are those of the polygon along that axis, one after the
+    /// other.
+    pub fn walks<'t>(&'t self, texture: &'t Texture<'t>) -> impl FnMut(&Run<()>) -> job::Walk + 't {
+        let Self {
+            plane,
+            tolerance,
+            by,
+        } = self;
+        // A run as long as one that was no line is not tried: neighbours are alike.
+        let mut too_long = u16::MAX;
+        move |run| {
+            let (axis, (x, y)) = match by {
+                By::Map(map) => return job::Walk::Affine(map.walk(run)),
+                By::Columns(_) => (Axis::Down, (run.line, run.first)),
+                By::Rows => (Axis::Right, (run.first, run.line)),
+            };
+            let walk = Walk::new(plane, axis, x, y);
+            if let By::Columns(Some(chords)) = by
+                && chords.keep(&walk, run.len - 1)
+                && let Some(line) = adaptive::whole(&walk, run.len, texture)
+            {
+                return job::Walk::Affine(line);
             }
-            Way::Linear(pieces) => job::Walk::Linear(walk, pieces),
-            Way::Quadratic(pieces) => job::Walk::Quadratic(walk, pieces),
-            Way::Exact => job::Walk::Exact(walk),
+            if run.len < too_long {
+                let mut pieces = Pieces::new(&walk, run.len, None, *tolerance, texture);
+                match pieces.next() {
+                    Some(piece) if piece.len == run.len => return job::Walk::Affine(piece.walk),
+                    _ => too_long = run.len,
+                }
+            }
+            job::Walk::Adaptive(walk, *tolerance)
+        }
+    }
+}
+
+/// Below so many pixels a run has few pieces, whichever way it goes.
+const SHORT: u16 = 32;
+
+/// The axis along which a polygon's lines take less, in the sum of its corners.
+fn axis(polygon: &[Vertex], span: &Span, plane: &Plane, tolerance: Tolerance) -> Axis {
+    let [(left, top), (right, bottom)] = span.pixels();
+    if right - left < SHORT && bottom - top < SHORT {
+        return Axis::Down;
+    }
+    // In 1/256 of what a pixel of a line takes.
+    let cost = |axis: Axis, steps: u16, piece: u32, (x, y): (u16, u16)| {
+        let walk = Walk::new(plane, axis, x, y);
+        let (depth, exact) = (walk.at[2], EXACT << 8);
+        if depth <= 0 {
+            return exact;
+        }
+        let chords = Chords::new(&[walk], depth, tolerance.units());
+        let depth = chords.cut(depth);
+        let mut lengths = [steps].into_iter().chain(LENGTHS);
+        let length = lengths.find(|&length| !chords.is_short_of(length, depth));
+        length.map_or(exact, |length| {
+            let line = (1 << 8) + (piece << 8) / u32::from(length.min(steps).max(1));
+            line.min(exact)
+        })
+    };
+    let (mut columns, mut rows) = (0, 0);
+    for vertex in polygon {
+        let at = |border: i32, first: u16, last: u16| {
+            (border >> 8).clamp(first.into(), last.into()) as u16
         };
-        sink(y, len, walk);
+        let place = (at(vertex.x, left, right), at(vertex.y, top, bottom));
+        columns += cost(Axis::Down, bottom - top, PIECE, place);
+        rows += cost(Axis::Right, right - left, ROW * PIECE, place);
+    }
+    match rows < columns {
+        true => Axis::Right,
+        false => Axis::Down,
     }
 }

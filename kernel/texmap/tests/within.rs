@@ -3,14 +3,16 @@
 mod random;
 
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 use oracle::coverage::inside;
 use random::{COLUMNS, DEEP_COLUMNS, generator, off, side};
+use texmap::adaptive::{EXACT, LENGTHS, PIECE, Pieces};
 use texmap::bounds::{Affine, Bend};
 use texmap::coverage::{self, Axis};
 use texmap::plane::{self, Anchor};
-use texmap::runs::{Pieces, between};
-use texmap::within::{Way, Within};
+use texmap::runs::Pieces::Whole;
+use texmap::within::{ROW, Within};
 use texmap::{Face, Mapper, Point, Texture, Tolerance, Vertex, Walk};
 
 const FOCAL_LENGTH: i32 = 258;
@@ -21,8 +23,8 @@ struct Seen {
     anchors: [Anchor; 3],
 }
 
-/// A quarter of a plane, or half of one, that a rectangle of the texture lies on: small facets, walls,
-/// floors to the horizon, and anything.
+/// A quarter of a plane, or half of one, that a rectangle of the texture lies on: small facets,
+/// walls, floors to the horizon, and anything.
 fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
     let kind = random.u8(0..4);
     let (w, h) = (i32::from(size.0) << 16, i32::from(size.1) << 16);
@@ -106,15 +108,13 @@ fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
     })
 }
 
-/// Gives `sink` columns of faces as [`seen`] makes them, at least so many.
-fn columns(
-    least: u32,
+/// Gives `sink` faces as [`seen`] makes them, until it has had enough.
+fn faces(
     random: &mut fastrand::Rng,
-    mut sink: impl FnMut(&Face<'_>, &plane::Plane, &Texture<'_>, &coverage::Run),
+    mut sink: impl FnMut(&Face<'_>, &plane::Plane, &Texture<'_>) -> ControlFlow<()>,
 ) {
     let texels = vec![0; 1 << 16];
-    let mut count = 0;
-    while count < least {
+    loop {
         let size = (side(random), side(random));
         let texture = &texels[..usize::from(size.0) * usize::from(size.1)];
         let texture = Texture::new(texture, size.0, size.1).unwrap();
@@ -127,117 +127,280 @@ fn columns(
             anchors,
             focal_length: FOCAL_LENGTH,
         };
-        let plane = face.plane();
-        coverage::columns(&polygon, |run| {
-            sink(&face, &plane, &texture, &run);
+        if sink(&face, &face.plane(), &texture).is_break() {
+            return;
+        }
+    }
+}
+
+/// Gives `sink` columns of such faces, at least so many.
+fn columns(
+    least: u32,
+    random: &mut fastrand::Rng,
+    mut sink: impl FnMut(&Face<'_>, &plane::Plane, &Texture<'_>, &coverage::Run),
+) {
+    let mut count = 0;
+    faces(random, |face, plane, texture| {
+        coverage::columns(face.polygon, |run| {
+            sink(face, plane, texture, &run);
             count += 1;
         })
         .unwrap();
+        enough(count >= least)
+    });
+}
+
+fn enough(enough: bool) -> ControlFlow<()> {
+    match enough {
+        true => ControlFlow::Break(()),
+        false => ControlFlow::Continue(()),
     }
 }
 
-/// Which way a column went, by name.
-fn name(walk: &Walk, flat: bool) -> &'static str {
-    match walk {
-        Walk::Affine(_) if flat => "flat",
-        Walk::Affine(_) => "whole",
-        Walk::Linear(_, Pieces::Of(64)) => "linear-64",
-        Walk::Linear(_, Pieces::Of(32)) => "linear-32",
-        Walk::Linear(_, Pieces::Of(16)) => "linear-16",
-        Walk::Linear(_, Pieces::Of(8)) => "linear-8",
-        Walk::Linear(_, Pieces::Of(4)) => "linear-4",
-        Walk::Quadratic(_, Pieces::Whole) => "quadratic",
-        Walk::Quadratic(_, Pieces::Of(32)) => "quadratic-32",
-        Walk::Quadratic(_, Pieces::Of(16)) => "quadratic-16",
-        Walk::Exact(_) => "exact",
-        other => panic!("no way of the table: {other:?}"),
+/// The forms along a run.
+fn forms(plane: &plane::Plane, axis: Axis, run: &coverage::Run<()>) -> plane::Walk {
+    match axis {
+        Axis::Down => plane::Walk::new(plane, axis, run.line, run.first),
+        Axis::Right => plane::Walk::new(plane, axis, run.first, run.line),
     }
 }
 
+/// The walk of `len` pixels from pixel `first` of another on.
+fn from(walk: &plane::Walk, first: u16) -> plane::Walk {
+    plane::Walk {
+        at: walk.after(first),
+        ..*walk
+    }
+}
+
+/// Whether all of a run may be one line, by the closed form.
+fn keeps(walk: &plane::Walk, len: u16, tolerance: Tolerance, texture: &Texture<'_>) -> bool {
+    let first = Pieces::new(walk, len, None, tolerance, texture).next();
+    first.is_some_and(|piece| piece.len == len)
+}
+
+/// Checks that no cheaper way would have kept to the error by its own bound, all of them tried, and
+/// counts the pixels of each way: those of an adaptive run's pieces by their lengths.
+fn none_cheaper(
+    walk: &plane::Walk,
+    (len, row): (u16, Option<u16>),
+    tolerance: Tolerance,
+    texture: &Texture<'_>,
+    mut count: impl FnMut(&'static str, u16),
+) {
+    let keeps = |first: u16, len: u16| keeps(&from(walk, first), len, tolerance, texture);
+    assert!(!keeps(0, len), "a line would do");
+    let backward = walk.step[2] > 0;
+    // The `steps` from pixel `near` of the run on, away from its near end.
+    let line = |near: u16, steps: u16| match backward {
+        false => keeps(near, steps + 1),
+        true => keeps(near - steps, steps + 1),
+    };
+    let place = |done: u16| if backward { len - 1 - done } else { done };
+    let mut pieces = Pieces::new(walk, len, row, tolerance, texture);
+    let mut done = 0;
+    for piece in pieces.by_ref() {
+        let left = len - 1 - done;
+        let longer = LENGTHS
+            .iter()
+            .filter(|&&length| length > piece.len + 3 && length <= left);
+        for &length in longer {
+            assert!(
+                !line(place(done), length),
+                "{length} pixels in place of {piece:?} would do"
+            );
+        }
+        count(
+            if piece.len < 32 {
+                "lines"
+            } else {
+                "long lines"
+            },
+            piece.len,
+        );
+        done += piece.len;
+    }
+    if let Some((_, rest, _)) = pieces.rest() {
+        let shortest = LENGTHS[LENGTHS.len() - 1];
+        if rest > shortest {
+            assert!(
+                !line(place(done), shortest),
+                "a line in place of {rest} quotients"
+            );
+        }
+        // What a quadratic of 32 pixels might have taken three quarters of the time for.
+        let curves = (done..len - 1).step_by(32).filter(|&at| at + 32 < len);
+        let first = |at: u16| if backward { len - 1 - at - 32 } else { at };
+        let bends = curves.map(|at| Bend::new(&from(walk, first(at)), 33, texture));
+        let curved = bends.filter(|bend| bend.quadratic(Whole) <= tolerance.units());
+        let curved = 32 * curved.count() as u16;
+        count("exact, a curve would do", curved);
+        count("exact", rest - curved);
+    }
+}
+
+/// Either way, no pixel of any face is further off than the tolerance, and no way that was taken is
+/// dearer than another.
 fn within(least: u32, tolerance: &str) {
     let mut random = generator();
     let tolerance = Tolerance::parse(tolerance).unwrap();
-    let mut ways = BTreeMap::new();
-    let (mut worst, mut pixels, mut count, mut parts) = (0f64, 0u64, 0u32, 0u32);
-    columns(least, &mut random, |face, plane, texture, run| {
+    let mut ways = [BTreeMap::new(), BTreeMap::new()];
+    let (mut worst, mut pixels, mut runs) = (0f64, [0u64; 2], [0; 2]);
+    faces(&mut random, |face, plane, texture| {
         let within = Within::new(face.polygon, *plane, texture, tolerance);
-        let x = run.line;
-        let mut next = run.first;
-        let flat = within.flat(x, run.first, run.len);
-        within.parts((x, run.first), run.len, texture, &mut |y, len, walk| {
-            assert_eq!(y, next, "a part begins where another ended");
-            next += len;
-            let forms = plane::Walk::new(plane, Axis::Down, x, y);
-            let bend = Bend::new(&forms, len, texture);
-            // Nothing cheaper keeps to it, by its own bound.
-            let keeps = |way: Way| way.bound(&bend) <= tolerance.units();
-            let cheapest = Way::ALL
-                .iter()
-                .copied()
-                .filter(|&(way, _)| keeps(way))
-                .min_by_key(|&(way, cost)| way.cost(cost, len))
-                .expect("the quotients are none off")
-                .0;
-            let expected = match (flat, cheapest) {
-                (Some(walk), _) => Walk::Affine(walk),
-                (None, Way::Linear(Pieces::Whole)) => {
-                    let [from, to] = bend.ends;
-                    Walk::Affine(between(from, to, len - 1))
+        for axis in [Axis::Down, Axis::Right] {
+            let k = usize::from(axis == Axis::Right);
+            let mut walks = within.walks(texture);
+            coverage::spans(axis, face.polygon, |run| {
+                let forms = forms(plane, axis, &run);
+                let walk = match axis == within.axis() {
+                    true => walks(&run),
+                    // As it would be if rows paid, or if columns did.
+                    false => Walk::Adaptive(forms, tolerance),
+                };
+                let (x, y, row) = match axis {
+                    Axis::Down => (run.line, run.first, None),
+                    Axis::Right => (run.first, run.line, Some(run.first)),
+                };
+                let mut count = |way, pixels: u16| {
+                    *ways[k].entry(way).or_insert(0u64) += u64::from(pixels);
+                };
+                match walk {
+                    Walk::Affine(_) if within.map().is_some() => count("one map", run.len),
+                    Walk::Affine(_) => count("a line", run.len),
+                    Walk::Adaptive(..) if keeps(&forms, run.len, tolerance, texture) => {
+                        count("a line", run.len);
+                    }
+                    Walk::Adaptive(..) => {
+                        none_cheaper(&forms, (run.len, row), tolerance, texture, count);
+                    }
+                    other => panic!("no way of the table: {other:?}"),
                 }
-                (None, Way::Linear(pieces)) => Walk::Linear(forms, pieces),
-                (None, Way::Quadratic(pieces)) => Walk::Quadratic(forms, pieces),
-                (None, Way::Exact) => Walk::Exact(forms),
-            };
-            assert_eq!(walk, expected, "{run:?} of {:?}", face.polygon);
-            *ways.entry(name(&walk, flat.is_some())).or_insert(0u32) += 1;
-            parts += 1;
-            // And it is no further off than that; the exact coordinates are rounded down.
-            let job = texmap::Job {
-                axis: Axis::Down,
-                x,
-                y,
-                len,
-                texture: 0,
-                walk,
-            };
-            let size = (texture.width(), texture.height());
-            job.pixels(texture, |(_, row), coordinates| {
-                let off = off(&forms, row - y, coordinates, size);
-                let context = || format!("{walk:?} {run:?} of {:?}", face.polygon);
-                assert!(
-                    off <= f64::from(tolerance.units()),
-                    "{off} at {row}: {}",
-                    context()
-                );
-                worst = worst.max(off);
-            });
-        });
-        assert_eq!(next, run.first + run.len, "all of the run is mapped");
-        pixels += u64::from(run.len);
-        count += 1;
+                let job = texmap::Job {
+                    axis,
+                    x,
+                    y,
+                    len: run.len,
+                    texture: 0,
+                    walk,
+                };
+                let size = (texture.width(), texture.height());
+                job.pixels(texture, |(to_x, to_y), coordinates| {
+                    let off = off(&forms, (to_x - x) + (to_y - y), coordinates, size);
+                    let context = || format!("{walk:?} {run:?} of {:?}", face.polygon);
+                    assert!(
+                        off <= f64::from(tolerance.units()),
+                        "{off} at {to_x}, {to_y}: {}",
+                        context()
+                    );
+                    worst = worst.max(off);
+                });
+                pixels[k] += u64::from(run.len);
+                runs[k] += 1;
+            })
+            .unwrap();
+        }
+        enough(runs.iter().all(|&runs| runs >= least))
     });
-    let share = |count: u32, all: u32| f64::from(count) / f64::from(all) * 100.0;
-    let list = ways
-        .iter()
-        .map(|(name, &n)| format!("{name} {:.1}", share(n, parts)));
-    let list: Vec<_> = list.collect();
     println!(
-        "within {tolerance}: {count} columns of {} pixels, worst {:.1} % of it; {parts} parts, in %: {}",
-        pixels / u64::from(count),
-        worst / f64::from(tolerance.units()) * 100.0,
-        list.join(", ")
+        "within {tolerance}: worst {:.1} % of it",
+        worst / f64::from(tolerance.units()) * 100.0
     );
+    for (k, name) in ["columns", "rows"].into_iter().enumerate() {
+        let share = |(way, &of): (&&str, &u64)| {
+            format!("{way} {:.1}", of as f64 / pixels[k] as f64 * 100.0)
+        };
+        let shares: Vec<_> = ways[k].iter().map(share).collect();
+        println!(
+            "  {} {name} of {} pixels; of these, in %: {}",
+            runs[k],
+            pixels[k] / u64::from(runs[k]),
+            shares.join(", ")
+        );
+        for way in ["a line", "exact", "lines", "long lines"] {
+            assert!(ways[k].contains_key(way), "{name}: {way}");
+        }
+        // So few that curves are no way of their own.
+        let few = if tolerance.units() >= 1 << 12 { 2 } else { 12 };
+        assert!(
+            ways[k]["exact, a curve would do"] * 100 <= pixels[k] * few,
+            "{name}"
+        );
+    }
     // Hardly any face is flat to 1/256 texel.
     let rough = tolerance >= Tolerance::parse("1/4").unwrap();
-    assert!(
-        (ways.contains_key("flat") || !rough) && ways.len() >= 4,
-        "{ways:?}"
-    );
+    assert!(ways[0].contains_key("one map") || !rough);
     assert!(worst >= 0.8 * f64::from(tolerance.units()));
 }
 
+/// The lengths of pieces are those that pay.
 #[test]
-fn every_column_keeps_to_its_error_and_none_wastes_anything() {
+fn a_shorter_piece_would_take_longer_than_quotients() {
+    let shortest = u32::from(LENGTHS[LENGTHS.len() - 1]);
+    assert!(PIECE + shortest < EXACT * shortest);
+    let less = shortest - 4;
+    assert!(PIECE + less >= EXACT * less);
+    assert!(LENGTHS.windows(2).all(|pair| pair[0] > pair[1]));
+    assert!(LENGTHS.iter().all(|length| length % 4 == 0));
+}
+
+/// What an axis takes, by the pieces that its runs are cut into, in pixels of a line.
+fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>) -> u64 {
+    let (plane, piece) = (
+        face.plane(),
+        if axis == Axis::Right {
+            ROW * PIECE
+        } else {
+            PIECE
+        },
+    );
+    let mut cost = 0;
+    coverage::spans(axis, face.polygon, |run| {
+        let row = (axis == Axis::Right).then_some(run.first);
+        let forms = forms(&plane, axis, &run);
+        let mut pieces = Pieces::new(&forms, run.len, row, tolerance, texture);
+        cost += pieces.by_ref().count() as u64 * u64::from(piece) + u64::from(run.len);
+        let exact = pieces.rest().map_or(0, |(_, len, _)| u64::from(len));
+        cost += exact * u64::from(EXACT - 1);
+    })
+    .unwrap();
+    cost
+}
+
+/// The axis is found from a polygon's corners. How near that comes to what all of its runs say.
+#[test]
+fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
+    let mut random = generator();
+    for tolerance in ["1", "1/4", "1/16"] {
+        let tolerance = Tolerance::parse(tolerance).unwrap();
+        let (mut count, mut rows, mut sums) = (0, 0, [0; 3]);
+        faces(&mut random, |face, plane, texture| {
+            let within = Within::new(face.polygon, *plane, texture, tolerance);
+            if within.map().is_none() {
+                let costs =
+                    [Axis::Down, Axis::Right].map(|axis| cost(face, axis, tolerance, texture));
+                let is_row = within.axis() == Axis::Right;
+                let all = [costs[usize::from(is_row)], costs[0].min(costs[1]), costs[0]];
+                sums = [0, 1, 2].map(|k| sums[k] + all[k]);
+                rows += u32::from(is_row);
+                count += 1;
+            }
+            enough(count >= 3000)
+        });
+        let [taken, best, columns] = sums;
+        println!(
+            "within {tolerance}: rows for {rows} of {count} faces, {:.3} of what the cheaper axis of each takes; \
+             columns {:.3}",
+            taken as f64 / best as f64,
+            columns as f64 / best as f64
+        );
+        assert!(taken * 100 < best * 105 && taken * 100 < columns * 95);
+        assert!(rows * 20 > count && rows * 20 < count * 19);
+    }
+}
+
+#[test]
+fn every_run_keeps_to_its_error_and_none_wastes_anything() {
     for tolerance in ["1", "1/2", "1/4", "1/16", "1/256"] {
         within(COLUMNS, tolerance);
     }
@@ -245,8 +408,8 @@ fn every_column_keeps_to_its_error_and_none_wastes_anything() {
 
 /// `cargo test --release -p texmap --test within -- --ignored --nocapture`
 #[test]
-#[ignore = "a million columns for each error: a minute in a release build"]
-fn every_column_of_a_million_keeps_to_its_error() {
+#[ignore = "a million columns and rows for each error: some minutes in a release build"]
+fn every_run_of_a_million_keeps_to_its_error() {
     for tolerance in ["1", "1/2", "1/4", "1/16", "1/256"] {
         within(DEEP_COLUMNS, tolerance);
     }
@@ -351,8 +514,9 @@ fn a_run_is_inside_its_polygon() {
     });
 }
 
-/// A sliver that faces the eye, with a texture squeezed into it: 320 texels from a pixel to the next,
-/// half as many back from a row to the next. Nothing leans, so only how steep it is speaks against one map.
+/// A sliver that faces the eye, with a texture squeezed into it: 320 texels from a pixel to the
+/// next, half as many back from a row to the next. Nothing leans, so only how steep it is speaks
+/// against one map.
 #[test]
 fn a_sliver_with_more_texels_a_pixel_than_a_texture_has_keeps_to_its_error() {
     let texture = Texture::new(&[0; 256 * 256], 256, 256).unwrap();
@@ -380,9 +544,9 @@ fn a_sliver_with_more_texels_a_pixel_than_a_texture_has_keeps_to_its_error() {
     let mut pixels = 0;
     for mapper in ["within-1", "within-1/256"] {
         let jobs = Mapper::parse(mapper).unwrap().jobs(&face, &texture, |job| {
-            let forms = plane::Walk::new(&face.plane(), Axis::Down, job.x, job.y);
-            job.pixels(&texture, |(_, y), at| {
-                let off = off(&forms, y - job.y, at, (256, 256));
+            let forms = plane::Walk::new(&face.plane(), job.axis, job.x, job.y);
+            job.pixels(&texture, |(x, y), at| {
+                let off = off(&forms, (x - job.x) + (y - job.y), at, (256, 256));
                 assert!(off <= 65536.0, "{off} at {y} of {job:?}");
                 pixels += 1;
             });

@@ -150,7 +150,7 @@ mod tests {
             for (name, least, most) in [
                 ("shifts", 48.0, 75.0),
                 ("row-steps", 30.0, 50.0),
-                ("within-1/4", 0.2, 0.25),
+                ("within-1/256", 0.003, 0.003_906_25),
                 ("tiles-16", 0.7, 1.0),
                 ("free", 0.0, 0.01),
                 ("exact", 0.0, 0.0),

@@ -1,4 +1,4 @@
-//! The affine column loops alone: a picture of 320 columns of 200 pixels in RAM.
+//! The column loops alone: a picture of 320 columns of 200 pixels in RAM.
 //!
 //! `cargo bench -p texmap` times each with `divan`, then prints cycles a pixel, and what they are
 //! of the bare loop's in the same order and of the packed loop's in x order. Times are ratios
@@ -9,7 +9,7 @@ mod work;
 use modex::PlanarBuffer;
 use texmap::loops::Loop;
 use texmap::{Mapper, Rows};
-use work::{By, Order, PIXELS, draw, texels, texture};
+use work::{By, Order, PIECES, PIXELS, draw, texels, texture};
 
 /// All that is timed.
 fn all() -> Vec<(By, Order)> {
@@ -17,6 +17,8 @@ fn all() -> Vec<(By, Order)> {
     for order in [Order::X, Order::Planes] {
         all.push((By::Bare, order));
         all.extend(Loop::ALL.map(|by| (By::Loop(by), order)));
+        all.extend(PIECES.map(|length| (By::Pieces(length), order)));
+        all.push((By::Quotients, order));
     }
     all.extend([Rows::Multiply, Rows::Steps, Rows::Passes].map(|rows| (By::Rows(rows), Order::X)));
     all
@@ -27,6 +29,8 @@ fn name(by: By) -> String {
     match by {
         By::Bare => "bare load and store".into(),
         By::Loop(by) => Mapper::Affine(by).to_string(),
+        By::Pieces(length) => format!("pieces of {length}"),
+        By::Quotients => "quotients".into(),
         By::Rows(rows) => Mapper::Rows(rows).to_string(),
     }
 }
@@ -131,6 +135,20 @@ mod cycles {
                     By::Loop(by) if !by.is_tuned_here() => " (portable)",
                     _ => "",
                 },
+            );
+        }
+        // What `texmap::adaptive` counts with.
+        for order in [Order::X, Order::Planes] {
+            let [short, long] = [PIECES[0], PIECES[PIECES.len() - 1]];
+            let more = median(By::Pieces(short), order) - median(By::Pieces(long), order);
+            let piece = more / (1.0 / f64::from(short) - 1.0 / f64::from(long));
+            let pixel = median(By::Loop(Loop::fastest()), order);
+            println!(
+                "{order:?}: a piece takes {piece:.0} cycles, as many as {:.0} pixels of {}; a quotient \
+                 {:.1} pixels",
+                piece / pixel,
+                name(By::Loop(Loop::fastest())),
+                median(By::Quotients, order) / pixel,
             );
         }
         for (what, at) in [("medians", ROUNDS / 2), ("fastest", 0)] {

@@ -2,10 +2,10 @@
 //! the loop that can't be beaten.
 
 use modex::{Column, Destination, PlanarBuffer};
-use texmap::affine::Walk;
+use texmap::affine::Walk as Affine;
 use texmap::coverage::Axis;
 use texmap::loops::Loop;
-use texmap::{Job, Rows, Style, Texture};
+use texmap::{Job, Rows, Style, Texture, Tolerance, Walk, plane};
 
 /// Columns of the picture.
 pub const COLUMNS: u16 = 320;
@@ -29,13 +29,14 @@ pub fn texture(texels: &[u8]) -> Texture<'_> {
     Texture::padded(texels, SIDE, SIDE).expect("SIDE x SIDE texels")
 }
 
-/// Steps of 0.20 and 0.27 texel a pixel: the picture lies aslant in the texture and almost fills it.
+/// Steps of 0.20 and 0.27 texel a pixel: the picture lies aslant in the texture and almost fills
+/// it.
 const STEPS: (i32, i32) = (13_235, 17_695);
 
 /// The walk down column `x`.
-pub fn down(x: u16) -> Walk {
+pub fn down(x: u16) -> Affine {
     let (x, (du, dv)) = (i32::from(x), STEPS);
-    Walk {
+    Affine {
         u: 0x1_0000 + x * dv,
         v: 0x1_8000 + (i32::from(COLUMNS) - x) * du,
         du,
@@ -44,9 +45,9 @@ pub fn down(x: u16) -> Walk {
 }
 
 /// The walk along row `y` of the same picture.
-pub fn along(y: u16) -> Walk {
+pub fn along(y: u16) -> Affine {
     let (first, y, (du, dv)) = (down(0), i32::from(y), STEPS);
-    Walk {
+    Affine {
         u: first.u + y * du,
         v: first.v + y * dv,
         du: dv,
@@ -81,6 +82,10 @@ pub enum By {
     Bare,
     /// A loop for columns.
     Loop(Loop),
+    /// Adaptive columns whose pieces are all as long: one of [`PIECES`].
+    Pieces(u16),
+    /// A quotient for every pixel of a column.
+    Quotients,
     /// A mapper of rows; it has an order of its own.
     Rows(Rows),
 }
@@ -98,6 +103,13 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
                 page.column(x, 0, LEN, |column| by.column(texture, down(x), column));
             }
         }
+        By::Pieces(length) => {
+            let tolerance = tolerance(length);
+            columns(page, texture, order, |x| {
+                Walk::Adaptive(leaning(x, 1, 13), tolerance)
+            });
+        }
+        By::Quotients => columns(page, texture, order, |x| Walk::Exact(leaning(x, 8, 8))),
         By::Rows(rows) => {
             let style = Style {
                 rows,
@@ -110,11 +122,66 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
                     y,
                     len: COLUMNS,
                     texture: 0,
-                    walk: texmap::Walk::Affine(along(y)),
+                    walk: Walk::Affine(along(y)),
                 };
                 row.draw(style, texture, page);
             }
         }
+    }
+}
+
+/// Lengths of pieces that are timed.
+pub const PIECES: [u16; 4] = [8, 16, 32, 64];
+
+/// The forms down column `x`: depth falls by a part in 2^`lean` of its first value with every
+/// pixel, and the texture begins to pass at a part of the picture's steps.
+fn leaning(x: u16, part: i64, lean: u32) -> plane::Walk {
+    let depth = 1 << 44;
+    let fall = -(depth >> lean);
+    let Affine { u, v, du, dv } = down(x);
+    let form = |at: i32, step: i32| {
+        let (at, step) = (i64::from(at), i64::from(step) / part);
+        let whole = |n: i128| (n >> 16) as i64;
+        let rise = i128::from(step) * i128::from(depth) + i128::from(at) * i128::from(fall);
+        (whole(i128::from(at) * i128::from(depth)), whole(rise))
+    };
+    let (a, b) = (form(u, du), form(v, dv));
+    plane::Walk {
+        at: [a.0, b.0, depth],
+        step: [a.1, b.1, fall],
+    }
+}
+
+/// What pieces of a length keep to and longer ones do not, down all of such a column.
+fn tolerance(length: u16) -> Tolerance {
+    let length = u32::from(length);
+    // The closed form, where the column begins; c falls by a fortieth, and the next length is 4/3.
+    let error = STEPS.1 as u32 * length * length / (4 << 13);
+    let units = error * 4 / 3 + length + 2;
+    Tolerance::new(units, 1 << 16).expect("less than a texel")
+}
+
+/// Draws columns as a mapper in perspective does.
+fn columns(
+    page: &mut PlanarBuffer,
+    texture: &Texture<'_>,
+    order: Order,
+    walk: impl Fn(u16) -> Walk,
+) {
+    let style = Style {
+        affine: Loop::fastest(),
+        ..Style::default()
+    };
+    for x in order.columns() {
+        let job = Job {
+            axis: Axis::Down,
+            x,
+            y: 0,
+            len: LEN,
+            texture: 0,
+            walk: walk(x),
+        };
+        job.draw(style, texture, page);
     }
 }
 

@@ -12,7 +12,7 @@
 #![allow(unsafe_code)]
 
 use core::arch::asm;
-use core::arch::x86_64::{__cpuid, __cpuid_count};
+use core::arch::x86_64::{__cpuid, __cpuid_count, _pext_u64};
 use core::sync::atomic::{AtomicU8, Ordering};
 
 use modex::{Column, STRIDE};
@@ -20,6 +20,7 @@ use modex::{Column, STRIDE};
 use super::steps::{Address, Crossed, Halves, Joint, Pair, start};
 use crate::Texture;
 use crate::affine::Walk;
+use crate::places::Part;
 
 /// Pixels in a block.
 const BLOCK: usize = 32;
@@ -415,6 +416,25 @@ pub(super) fn extract(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
 #[inline(always)]
 pub(super) fn extract_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     extract!(eights, texture, walk, column);
+}
+
+/// [`extract`] along a row. The CPU must have it.
+#[inline(always)]
+pub(super) fn along(texels: &[u8], joint: Joint, places: impl Part) {
+    /// Compiled for such a CPU, and with it the loop that `places` is filled by.
+    #[target_feature(enable = "bmi2")]
+    fn extract(texels: &[u8], joint: Joint, places: impl Part) {
+        let Joint { mut at, step, mask } = joint;
+        places.fill(|| {
+            let index = _pext_u64(at, mask) as usize;
+            at = at.wrapping_add(step);
+            // SAFETY: the mask has bits for as many texels as there are.
+            unsafe { *texels.get_unchecked(index) }
+        });
+    }
+    debug_assert!(has_extract());
+    // SAFETY: the CPU has BMI2, by the caller's word.
+    unsafe { extract(texels, joint, places) }
 }
 
 /// Whether the CPU has BMI2, and with it PEXT. Asked once: CPUID is slow, under a hypervisor most
