@@ -114,10 +114,11 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
         false,
         over(host.time("row-multiply", Order::Polygons), best),
     );
+    // By polygons: in the order of the planes rows are not drawn as a mapper of rows says.
     let screen = |cpu, mapper: fn(Mapper) -> bool| -> Figure {
         let rows = of(measured?, cpu).iter();
         let figures = rows
-            .filter(|row| mapper(row.mapper))
+            .filter(|row| mapper(row.mapper) && row.order == Order::Polygons)
             .map(Row::instructions_a_pixel);
         figures.min_by(f64::total_cmp)
     };
