@@ -329,7 +329,7 @@ fn load_to_boot(files: &Files, options: &mut Options) -> anyhow::Result<Option<u
         return Ok(None);
     };
     say(format_args!(
-        "with its {} KiB the boot takes about {:.1} s longer",
+        "with its {} KiB the boot takes about {:.2} s longer",
         model.bytes.len().div_ceil(1024),
         model.boot_seconds()
     ));
