@@ -66,6 +66,30 @@ Examples (`cargo run -- ` hands on what follows):
 Exit codes: 0 done; 1 set-up failed; 2 wrong usage; 10 panic; 11 CPU exception; 12 triple fault;
 13 hang; 14 stopped in the boot loader; 15 QEMU failed; 16 serial line garbled; 130 ended by you.";
 
+const DOCTOR_HELP: &str = "\
+Examples:
+  cargo run -- doctor                                       what `cargo run` would find here
+  cargo run -- doctor --qemu /opt/bin/qemu-system-x86_64    whether this QEMU would do";
+
+const CLEAN_HELP: &str = "\
+Examples:
+  cargo run -- clean    the next run sets all of it up anew";
+
+const DUMP_HELP: &str = "\
+Examples:
+  cargo run -- dump --frames 0..10 --out a                   ten pictures of the ball
+  cargo run -- dump --frame 480 --scene knot --mapper exact  one of the knot, into dumps/
+  cargo run -- dump --frame 0 --all --out all                all of video memory
+  cargo run -- --vga cirrus dump --frames 0..10 --out b      from another display adapter
+  cargo run -- dump --frame 0 --model thing.obj --texture thing.png
+                                                             of your own model";
+
+const EMULATE_HELP: &str = "\
+Examples:
+  cargo run -- emulate --frames 0..10 --out b                  what `dump` would write
+  cargo run -- emulate --frame 0 --frame 480 --mapper affine   two pictures, into dumps/
+  cargo run -- emulate --pose 40000000 0 0 50000 --scene cube  in a pose of one's own";
+
 const RECORD_HELP: &str = "\
 Examples:
   cargo run -- record --out ball.gif                            a whole turn of the ball, 12 s
@@ -77,6 +101,30 @@ Examples:
   cargo run -- replay dumps                      play a folder in the terminal
   cargo run -- replay dumps --sheet sheet.png    all of it on one sheet
   cargo run -- replay tests/golden --sheet goldens.png";
+
+const DIFF_HELP: &str = "\
+Examples:
+  cargo run -- diff a b                         two folders, each file with its namesake
+  cargo run -- diff a b --report diff.html      with pictures of what differs
+  cargo run -- diff a/frame-000000.dump a/frame-000001.dump";
+
+const BLESS_HELP: &str = "\
+Examples:
+  cargo run -- bless                a picture was meant to change: look at the report it names
+  cargo run -- bless tests/golden   the same, the folder named";
+
+const TRADE_HELP: &str = "\
+Examples:
+  cargo run --release -- trade                            all of it, in minutes
+  cargo run --release -- trade --quick --host-only        a first look
+  cargo run --release -- trade --scenes cube,tilted --mappers affine,linear-16,exact
+                                                          some of it
+  cargo run --release -- trade --model thing.obj          your own model alone";
+
+const IMAGE_HELP: &str = "\
+Examples:
+  cargo run -- image --out ball.img                       the built-in scenes
+  cargo run -- image --out thing.img --model thing.obj    and your own model";
 
 #[derive(Debug, Args)]
 struct Boot {
@@ -102,13 +150,17 @@ struct Tools {
 #[derive(Debug, Subcommand)]
 enum Subcommands {
     /// Tell what is set up, where, and what is missing; install nothing
+    #[command(after_help = DOCTOR_HELP)]
     Doctor,
     /// Remove what the set-up keeps, and say how much that was
+    #[command(after_help = CLEAN_HELP)]
     Clean,
     /// Take dumps: boot, show each picture, and write what the card then holds, as text that
     /// `diff` can compare and as a PNG
+    #[command(after_help = DUMP_HELP)]
     Dump(Frames),
     /// Write the same files from the emulated card alone, without QEMU
+    #[command(after_help = EMULATE_HELP)]
     Emulate(Frames),
     /// Record the show: every picture that is asked for, however slow the machine is
     #[command(after_help = RECORD_HELP)]
@@ -119,6 +171,7 @@ enum Subcommands {
     /// Compare two dumps, two indexed PNGs, or two folders of them, and tell what differs
     ///
     /// Exit codes: 0 equal; 1 different; 2 could not compare.
+    #[command(after_help = DIFF_HELP)]
     Diff {
         /// What is expected
         a: PathBuf,
@@ -129,14 +182,17 @@ enum Subcommands {
         report: Option<PathBuf>,
     },
     /// Make the emulated card's pictures the golden frames, where QEMU agrees; look at each first
+    #[command(after_help = BLESS_HELP)]
     Bless {
         /// The golden frames' folder [default: tests/golden of the workspace]
         folder: Option<PathBuf>,
     },
     /// Measure what accuracy costs: every mapper's error and time on every scene, as tables,
     /// plots and a page; in a release build
+    #[command(after_help = TRADE_HELP)]
     Trade(trade::Options),
     /// Write the bootable disk image
+    #[command(after_help = IMAGE_HELP)]
     Image {
         /// The file to write
         #[arg(long, value_name = "FILE")]
@@ -413,4 +469,40 @@ fn write_image(image: &Path, out: &Path) -> anyhow::Result<()> {
         out.display()
     ));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The commands of the examples in a help text.
+    fn examples(help: &str) -> impl Iterator<Item = &str> {
+        let (_, examples) = help.split_once("\nExamples").unwrap_or_default();
+        let lines = examples.lines().map_while(|line| match line {
+            "" => None,
+            line => Some(line.trim_start()),
+        });
+        // What it does stands behind a gap.
+        let commands = lines.map(|line| line.split("  ").next().unwrap_or(line));
+        commands.filter(|line| line.starts_with("cargo "))
+    }
+
+    #[test]
+    fn every_help_has_examples_that_are_taken() {
+        let whole = Cli::command();
+        for of in [&whole].into_iter().chain(whole.get_subcommands()) {
+            let name = of.get_name();
+            let help = of.clone().render_long_help().to_string();
+            assert!(examples(&help).next().is_some(), "{name}: no examples");
+            for example in examples(&help) {
+                let arguments = example.split_once(" -- ").map_or("", |(_, after)| after);
+                let words = ["crystal-ball"].into_iter();
+                let words = words.chain(arguments.split_whitespace());
+                let taken = Cli::command().try_get_matches_from(words);
+                let taken = taken.unwrap_or_else(|error| panic!("{example}: {error}"));
+                let of_subcommand = taken.subcommand_name() == Some(name);
+                assert!(of_subcommand || name == whole.get_name(), "{example}");
+            }
+        }
+    }
 }
