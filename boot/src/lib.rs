@@ -18,3 +18,4 @@ pub mod report;
 pub mod screen;
 pub mod setup;
 pub mod trade;
+pub mod window;

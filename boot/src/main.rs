@@ -17,7 +17,7 @@ use crystal_ball::look::Look;
 use crystal_ball::machine::{Config, Failure, Machine, Verdict};
 use crystal_ball::model::{Files, Model};
 use crystal_ball::setup::{self, Options, Ready, say};
-use crystal_ball::{aside, child, record, replay, trade};
+use crystal_ball::{aside, child, record, replay, trade, window};
 use link::{Action, Change, Command};
 
 /// How long the ball turns before its picture is taken without a display.
@@ -408,11 +408,13 @@ fn has_display() -> bool {
 /// Boots the image and lets the user watch, or takes a picture where there is nothing to watch on.
 fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::Result<()> {
     let displays = &ready.qemu.displays;
-    let window = ["gtk", "sdl"]
+    // GTK's scales the picture with the window only if it is told to.
+    let display = [("gtk", "gtk,zoom-to-fit=on"), ("sdl", "sdl")]
         .into_iter()
-        .find(|window| displays.iter().any(|display| display == window))
-        .filter(|_| !headless && has_display());
-    if window.is_none() && !headless {
+        .find(|(name, _)| displays.iter().any(|display| display == name))
+        .filter(|_| !headless && has_display())
+        .map(|(_, display)| display);
+    if display.is_none() && !headless {
         let why = if has_display() {
             "this QEMU has no window (on Debian the package qemu-system-gui brings one)"
         } else {
@@ -423,10 +425,16 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
-        display: window.unwrap_or("none").to_string(),
+        display: display.unwrap_or("none").to_string(),
         ..config
     })?;
     machine.wait_until_running()?;
+    if display.is_some() {
+        // SDL's window follows the card's mode when QEMU next looks at the card; now it has.
+        machine.screen()?;
+        // Where it can't be done the window is small, as QEMU made it.
+        let _ = window::enlarge(machine.process());
+    }
     for command in look.commands() {
         machine.ask(command)?;
     }
@@ -434,7 +442,7 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
     say(format_args!(
         "the first picture is on the screen after {seconds:.1} s"
     ));
-    if window.is_some() {
+    if display.is_some() {
         machine.ask(Command::Steer(None, Change::Act(Action::Hint)))?;
         say("H in the window tells the keys; close it or type Ctrl-C to end it");
         return machine.watch();
