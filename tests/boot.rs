@@ -13,6 +13,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::path::Path;
 use std::process::{Command as Process, Output, Stdio};
 use std::sync::LazyLock;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use crystal_ball::card::{self, Card, Emulated};
@@ -380,32 +381,52 @@ fn crystal_ball(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn without_a_display_a_picture_is_left() {
+fn without_a_display_a_picture_is_left_and_so_by_a_second_one_beside_it() {
     LazyLock::force(&READY);
-    let output = crystal_ball(&[]);
-    let words = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{words}");
-    assert!(words.contains("there is no display"), "{words}");
-    let picture = String::from_utf8(output.stdout).unwrap();
-    let file = BufReader::new(File::open(picture.trim()).unwrap());
-    let mut picture = png::Decoder::new(file).read_info().unwrap();
-    let mut bytes = vec![0; picture.output_buffer_size().unwrap()];
-    let info = picture.next_frame(&mut bytes).unwrap();
-    assert_eq!(
-        (info.width, info.height, info.line_size),
-        (640, 480, 3 * 640)
-    );
-    // It is the picture of some tick of the first minute, from edge to edge.
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
-    let mut is_of = |frame| {
-        emulated.ask(Command::Show(Picture::Frame(frame))).unwrap();
-        emulated.screen().unwrap().pixels.as_flattened() == bytes
-    };
+    let arguments: [&[&str]; 2] = [&[], &["--scene", "cube", "--mapper", "within-1/4"]];
+    let both = thread::scope(|scope| {
+        arguments
+            .map(|arguments| scope.spawn(|| crystal_ball(arguments)))
+            .map(|run| run.join().unwrap())
+    });
+    let [ball, cube] = both.map(|output| {
+        let words = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{words}");
+        assert!(words.contains("there is no display"), "{words}");
+        String::from_utf8(output.stdout).unwrap()
+    });
     assert!(
-        (0..3600).any(&mut is_of),
-        "the picture is none of the show's"
+        cube.ends_with("picture-cube-within-1_4.png\n"),
+        "{ball}{cube}"
     );
+    for (picture, look) in [
+        (ball, &[][..]),
+        (cube, &["scene cube", "mapper within-1/4"][..]),
+    ] {
+        let file = BufReader::new(File::open(picture.trim()).unwrap());
+        let mut picture = png::Decoder::new(file).read_info().unwrap();
+        let mut bytes = vec![0; picture.output_buffer_size().unwrap()];
+        let info = picture.next_frame(&mut bytes).unwrap();
+        assert_eq!(
+            (info.width, info.height, info.line_size),
+            (640, 480, 3 * 640)
+        );
+        // It is the picture of some tick of the first minute, from edge to edge.
+        let mut memory = card::memory();
+        let mut emulated = Emulated::new(&mut memory).unwrap();
+        emulated.ask(Command::Hold).unwrap();
+        for command in look {
+            emulated.ask(Command::parse(command).unwrap()).unwrap();
+        }
+        let mut is_of = |frame| {
+            emulated.ask(Command::Show(Picture::Frame(frame))).unwrap();
+            emulated.screen().unwrap().pixels.as_flattened() == bytes
+        };
+        assert!(
+            (0..3600).any(&mut is_of),
+            "the picture is none of the show's: {look:?}"
+        );
+    }
 }
 
 #[test]

@@ -405,6 +405,19 @@ fn has_display() -> bool {
     set("DISPLAY") || set("WAYLAND_DISPLAY")
 }
 
+/// The picture of a show: of two at once that show different things each has its own.
+fn picture_name(look: &Look, pack: Option<u32>) -> String {
+    let mut name = String::from("picture");
+    for command in look.commands() {
+        if let Command::Set(_, Some(word)) = command {
+            // A tolerance is a fraction.
+            name += &format!("-{word}").replace('/', "_");
+        }
+    }
+    name.extend(pack.map(|pack| format!("-{pack:08x}")));
+    name + ".png"
+}
+
 /// Boots the image and lets the user watch, or takes a picture where there is nothing to watch on.
 fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::Result<()> {
     let displays = &ready.qemu.displays;
@@ -422,6 +435,7 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
         };
         say(format_args!("{why}: booting without a window"));
     }
+    let name = picture_name(look, config.pack);
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
@@ -448,7 +462,7 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
         return machine.watch();
     }
     machine.rest(WARM_UP)?;
-    let picture = setup::folder().join("picture.png");
+    let picture = setup::folder().join(name);
     let screen = machine.screen()?;
     aside::write(&picture, |file| screen.write_png(file))?;
     machine.leave()?;

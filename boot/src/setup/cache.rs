@@ -44,7 +44,7 @@ impl Cache {
         };
         fs::create_dir_all(&self.folder).with_context(unusable)?;
         let lock = File::create(self.path(LOCK)).with_context(unusable)?;
-        wait(&lock)?;
+        wait(&lock, &self.path(LOCK))?;
         let aside = self.path(ASIDE);
         if aside.exists() {
             remove(&aside)?;
@@ -67,7 +67,7 @@ impl Cache {
     }
 }
 
-fn wait(lock: &File) -> anyhow::Result<()> {
+fn wait(lock: &File, path: &Path) -> anyhow::Result<()> {
     let begun = Instant::now();
     let mut said = false;
     loop {
@@ -81,7 +81,10 @@ fn wait(lock: &File) -> anyhow::Result<()> {
         }
         if !said && begun.elapsed() > Duration::from_secs(1) {
             said = true;
-            say("waiting for another set-up to finish");
+            say(format_args!(
+                "waiting for another set-up, which holds {}",
+                path.display()
+            ));
         }
         // Asked again and again, so that Ctrl-C is heard.
         std::thread::sleep(Duration::from_millis(20));
