@@ -10,6 +10,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use console::Term;
+use scene::font;
 
 use crate::diff::{Subject, list};
 use crate::indexed::{Indexed, widen};
@@ -36,6 +37,15 @@ pub struct Options {
 const SHEET_WIDTH: usize = 4096;
 /// Pixels between the pictures of a sheet.
 const GAP: usize = 4;
+/// A sheet's ground, and the names on it.
+const GROUND: [u8; 3] = [24; 3];
+const NAMES: [u8; 3] = [208; 3];
+/// From letter to letter, and from picture to picture for the name below, in the font's pixels.
+const LETTER: usize = font::WIDTH + 1;
+const LINE: usize = font::HEIGHT + 3;
+/// The names are a pixel larger for so many pixels of the pictures' width: below one that is not
+/// shrunk 26 letters have room, twice as large as the font is.
+const PER_SCALE: usize = 160;
 
 impl Options {
     /// Plays the pictures, or makes the sheet and tells `wrote` its path.
@@ -60,7 +70,7 @@ impl Options {
         drop(step);
         match &self.sheet {
             Some(sheet) => {
-                let laid_out = lay_out(&pictures);
+                let laid_out = lay_out(&pictures, &names(&files));
                 aside::write(sheet, |file| {
                     laid_out.write_png(std::io::BufWriter::new(file))
                 })?;
@@ -202,8 +212,56 @@ fn in_blocks(picture: &Indexed, columns: usize, rows: usize) -> String {
     text
 }
 
-/// All pictures on one sheet, row by row.
-fn lay_out(pictures: &[Indexed]) -> Screen {
+/// What stands below the pictures: the files' names, with their folders' where there is more than one.
+fn names(files: &[PathBuf]) -> Vec<String> {
+    let parent = |file: &PathBuf| file.parent().map(Path::to_owned);
+    let several = files.iter().any(|file| parent(file) != parent(&files[0]));
+    let name_of = |file: &PathBuf| {
+        let name = file.file_stem().unwrap_or_default().to_string_lossy();
+        let folder = file.parent().and_then(Path::file_name);
+        match folder.filter(|_| several) {
+            Some(folder) => format!("{}/{name}", folder.to_string_lossy()),
+            None => name.into_owned(),
+        }
+    };
+    files.iter().map(name_of).collect()
+}
+
+/// A name that fits into so many letters: what is cut out is its middle, since names of one folder
+/// often begin alike and end differently.
+fn cut(name: &str, letters: usize) -> String {
+    const CUT: &str = "..";
+    let all: Vec<char> = name.chars().collect();
+    if all.len() <= letters {
+        return name.into();
+    }
+    let Some(left) = letters.checked_sub(CUT.len()) else {
+        return all[all.len() - letters..].iter().collect();
+    };
+    let (begin, end) = (&all[..left / 2], &all[all.len() - left.div_ceil(2)..]);
+    begin
+        .iter()
+        .copied()
+        .chain(CUT.chars())
+        .chain(end.iter().copied())
+        .collect()
+}
+
+/// Writes on a sheet; all of it is on it.
+fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) {
+    for (i, letter) in text.chars().enumerate() {
+        let rows = font::glyph(letter);
+        for (y, x) in (0..font::HEIGHT * scale)
+            .flat_map(|y| (0..font::WIDTH * scale).map(move |x| (y, x)))
+            .filter(|&(y, x)| rows[y / scale] >> (x / scale) & 1 == 1)
+        {
+            sheet.pixels[(top + y) * sheet.width + left + i * LETTER * scale + x] = NAMES;
+        }
+    }
+}
+
+/// All pictures on one sheet, row by row, with their names below.
+fn lay_out(pictures: &[Indexed], names: &[String]) -> Screen {
     let across = (1..).find(|n| n * n >= pictures.len()).unwrap_or(1);
     let most = |of: fn(&Indexed) -> usize| pictures.iter().map(of).max().unwrap_or(1);
     let (wide, high) = (most(|p| p.width), most(|p| p.height));
@@ -211,21 +269,26 @@ fn lay_out(pictures: &[Indexed]) -> Screen {
     let cell_width = wide.min((SHEET_WIDTH / across).saturating_sub(GAP)).max(1);
     let cell_height = (high * cell_width / wide).max(1);
     let down = pictures.len().div_ceil(across);
+    let scale = (cell_width / PER_SCALE).max(1);
+    let pitch = cell_height + LINE * scale + GAP;
     let mut sheet = Screen {
         width: GAP + across * (cell_width + GAP),
-        height: GAP + down * (cell_height + GAP),
+        height: GAP + down * pitch,
         pixels: Vec::new(),
     };
-    sheet.pixels = vec![[24; 3]; sheet.width * sheet.height];
-    for (i, picture) in pictures.iter().enumerate() {
+    sheet.pixels = vec![GROUND; sheet.width * sheet.height];
+    for (i, (picture, name)) in pictures.iter().zip(names).enumerate() {
         let width = (picture.width * cell_width / wide).max(1);
         let height = (picture.height * cell_width / wide).max(1);
         let small = shrunk(picture, width, height);
         let left = GAP + i % across * (cell_width + GAP);
-        let top = GAP + i / across * (cell_height + GAP);
+        let top = GAP + i / across * pitch;
         for (y, row) in (top..).zip(small.pixels.chunks_exact(width)) {
             sheet.pixels[y * sheet.width + left..][..width].copy_from_slice(row);
         }
+        // The last letter needs no gap behind it.
+        let name = cut(name, (cell_width + scale) / (LETTER * scale));
+        write(&mut sheet, &name, left, top + height + 2 * scale, scale);
     }
     sheet
 }
@@ -258,12 +321,45 @@ mod tests {
     #[test]
     fn a_sheet_has_every_picture_in_its_place() {
         let pictures = vec![halves(320, 240); 5];
-        let sheet = lay_out(&pictures);
-        assert_eq!((sheet.width, sheet.height), (3 * 324 + 4, 2 * 244 + 4));
+        let names: Vec<_> = (0..5).map(|i| format!("frame-{i:06}")).collect();
+        let sheet = lay_out(&pictures, &names);
+        assert_eq!((sheet.width, sheet.height), (3 * 324 + 4, 2 * 264 + 4));
         let white = sheet.pixels.iter().filter(|&&pixel| pixel == [255; 3]);
         assert_eq!(white.count(), 5 * 160 * 240);
-        let many = lay_out(&vec![halves(320, 240); 400]);
+        // Nothing stands below the place that is left free, and something below each other one.
+        let letters_below = |i: usize| {
+            let rows = sheet.pixels.chunks_exact(sheet.width);
+            let below = rows.skip(4 + i / 3 * 264 + 240).take(20);
+            let of_picture = below.flat_map(|row| &row[4 + i % 3 * 324..][..320]);
+            of_picture.filter(|&&pixel| pixel == NAMES).count()
+        };
+        let counts: Vec<_> = (0..6).map(letters_below).collect();
+        assert!(counts[..5].iter().all(|&count| count > 400), "{counts:?}");
+        assert_eq!(counts[5], 0);
+        let names = vec!["a very long name".repeat(20); 400];
+        let many = lay_out(&vec![halves(320, 240); 400], &names);
         assert!(many.width <= SHEET_WIDTH + GAP, "{}", many.width);
+        // Smaller than a letter.
+        lay_out(&[halves(4, 3)], &["name".into()]);
+    }
+
+    #[test]
+    fn a_name_loses_its_middle_and_names_of_two_folders_have_theirs() {
+        for (name, letters, fits) in [
+            ("frame-000123", 12, "frame-000123"),
+            ("frame-000123", 11, "fram..00123"),
+            ("frame-000123", 10, "fram..0123"),
+            ("\u{e4}\u{e4}\u{e4}\u{e4}", 3, "..\u{e4}"),
+            ("frame", 2, ".."),
+            ("frame", 1, "e"),
+            ("frame", 0, ""),
+        ] {
+            assert_eq!(cut(name, letters), fits);
+        }
+        let files = |of: &[&str]| of.iter().map(PathBuf::from).collect::<Vec<_>>();
+        assert_eq!(names(&files(&["x/a.dump", "x/b.png"])), ["a", "b"]);
+        assert_eq!(names(&files(&["x/a.dump", "y/a.dump"])), ["x/a", "y/a"]);
+        assert_eq!(names(&files(&["a.dump", "y/a.dump"])), ["a", "y/a"]);
     }
 
     #[test]

@@ -8,7 +8,7 @@ pub const HEIGHT: usize = 7;
 /// Every character that is written anywhere. There are no small letters: they are written as
 /// capitals.
 #[rustfmt::skip]
-const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 43] = [
+const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 44] = [
     (b'%', [b"##..#", b"##..#", b"...#.", b"..#..", b".#...", b"#..##", b"#..##"]),
     (b'+', [b".....", b"..#..", b"..#..", b"#####", b"..#..", b"..#..", b"....."]),
     (b',', [b".....", b".....", b".....", b".....", b".##..", b"..#..", b".#..."]),
@@ -52,6 +52,7 @@ const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 43] = [
     (b'X', [b"#...#", b"#...#", b".#.#.", b"..#..", b".#.#.", b"#...#", b"#...#"]),
     (b'Y', [b"#...#", b"#...#", b".#.#.", b"..#..", b"..#..", b"..#..", b"..#.."]),
     (b'Z', [b"#####", b"....#", b"...#.", b"..#..", b".#...", b"#....", b"#####"]),
+    (b'_', [b".....", b".....", b".....", b".....", b".....", b".....", b"#####"]),
 ];
 
 /// A letter's rows, in each the columns as bits, the leftmost the lowest.
