@@ -311,7 +311,8 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
                 arguments: cli.qemu_arguments,
                 ..Config::new(&ready)
             })?;
-            let model = load(&files)?;
+            // What it is has been told.
+            let model = files.load()?;
             let pack = model.as_ref().map(Model::pack);
             let mut memory = card::memory();
             let mut emulated = Emulated::with(&mut memory, pack.as_ref())?;
