@@ -3,8 +3,8 @@
 //! Two reductions, each by a quantizer that works in a space of even steps to the eye (Oklab). The
 //! texture is reduced to [`MATERIALS`] colours. Then each of these is lit in all levels, from night
 //! to glint, as the built-in ramps are; and what that gives is reduced to the part of the palette
-//! that background and writing leave free. The light table takes each material at each level to the
-//! nearest entry of the whole palette.
+//! that background, writing and the split view's heat map leave free. The light table takes each
+//! material at each level to the nearest entry of the whole palette.
 //!
 //! Where the palette has no colour near enough, a surface would fall into bands. So a texel has not
 //! its material alone: by its place in a square of two by two it is one of [`VARIANTS`], and for
@@ -20,6 +20,7 @@ use quantette::deps::palette::{Oklab, Srgb};
 use quantette::{Pipeline, QuantizeMethod};
 use scene::catalogue::Colours;
 use scene::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable};
+use show::HEAT;
 
 use crate::indexed::widen;
 
@@ -79,10 +80,11 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
     let lit: Vec<Vec<Srgb<u8>>> = (0..LIGHT_LEVELS)
         .map(|level| materials.iter().map(|&colour| lit(colour, level)).collect())
         .collect();
-    let free = scene::MATERIALS;
     let mut palette = *Colours::BUILT_IN.palette;
-    let own = quantized(&weighted(&lit, &used), free.len());
-    for (entry, colour) in palette[free].iter_mut().zip(own) {
+    let (own, heat) = palette[scene::MATERIALS].split_at_mut(scene::MATERIALS.len() - HEAT.len());
+    heat.copy_from_slice(&HEAT);
+    let colours = quantized(&weighted(&lit, &used), own.len());
+    for (entry, colour) in own.iter_mut().zip(colours) {
         *entry = narrow(colour);
     }
     let shown: Vec<_> = palette
@@ -237,6 +239,9 @@ mod tests {
         let built_in = Colours::BUILT_IN.palette;
         for entry in (0..256).filter(|entry| !scene::MATERIALS.contains(entry)) {
             assert_eq!(reduced.palette[entry], built_in[entry]);
+        }
+        for step in HEAT {
+            assert!(reduced.palette.contains(&step), "{step:?}");
         }
         let brightness = |level: usize| -> u32 {
             let entries = reduced

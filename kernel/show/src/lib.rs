@@ -34,6 +34,7 @@ use texmap::{Mapper, Order, Stats};
 use keys::Keyboard;
 pub use keys::{KEYS, Key};
 use overlay::{Figures, Overlay, Writing};
+pub use split::HEAT;
 use split::Split;
 use steering::{Log, NotNoted, Notes, Scenes, State};
 

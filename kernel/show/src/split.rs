@@ -36,8 +36,9 @@ pub(crate) const LEGEND_LINES: usize = 5;
 pub(crate) const LEGEND_X: usize = WINDOWS[2] + (WINDOW - STEPS * LEGEND_STEP) / 2;
 pub(crate) const LEGEND_Y: usize = HEIGHT - 29;
 
+/// The heat map's colours. A palette that has them shows the steps apart.
 #[rustfmt::skip]
-const HEAT: [Rgb6; STEPS] = [
+pub const HEAT: [Rgb6; STEPS] = [
     [ 1,  1,  7], [ 3,  4, 17], [ 6,  7, 26], [10, 13, 37], [15, 19, 48], // to 1/16
     [ 8, 27, 49], [ 5, 34, 39], [15, 44, 46], [26, 54, 53], // to 1
     [46, 28,  8], [55, 40, 14], [62, 51, 20], // to 8
