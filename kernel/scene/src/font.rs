@@ -8,7 +8,7 @@ pub const HEIGHT: usize = 7;
 /// Every character that is written anywhere. There are no small letters: they are written as
 /// capitals.
 #[rustfmt::skip]
-const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 44] = [
+const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 45] = [
     (b'%', [b"##..#", b"##..#", b"...#.", b"..#..", b".#...", b"#..##", b"#..##"]),
     (b'+', [b".....", b"..#..", b"..#..", b"#####", b"..#..", b"..#..", b"....."]),
     (b',', [b".....", b".....", b".....", b".....", b".##..", b"..#..", b".#..."]),
@@ -53,6 +53,7 @@ const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 44] = [
     (b'Y', [b"#...#", b"#...#", b".#.#.", b"..#..", b"..#..", b"..#..", b"..#.."]),
     (b'Z', [b"#####", b"....#", b"...#.", b"..#..", b".#...", b"#....", b"#####"]),
     (b'_', [b".....", b".....", b".....", b".....", b".....", b".....", b"#####"]),
+    (b'~', [b".....", b".....", b".#...", b"#.#.#", b"...#.", b".....", b"....."]),
 ];
 
 /// A letter's rows, in each the columns as bits, the leftmost the lowest.
@@ -106,6 +107,6 @@ mod tests {
             assert_eq!(glyph(a), glyph(a.to_ascii_lowercase()));
             assert_ne!(glyph(a), [0; HEIGHT]);
         }
-        assert_eq!([' ', '\u{e4}', '~'].map(glyph), [[0; HEIGHT]; 3]);
+        assert_eq!([' ', '\u{e4}', '^'].map(glyph), [[0; HEIGHT]; 3]);
     }
 }

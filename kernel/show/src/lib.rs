@@ -41,9 +41,11 @@ use steering::{Log, NotNoted, Notes, Scenes, State};
 /// The program's version, as its first line and `version` tell it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What a mapper's name ends in where some faces were drawn in lower quality, since they moved. Such a
-/// picture is named by its log and tick: its pose does not tell which faces.
-const LOWERED: &str = "~";
+/// What a mapper's name ends in where so many faces were drawn in lower quality, since they moved. Such
+/// a picture is named by its log and tick: its pose does not tell which faces.
+fn lower_mark(lowered: u32) -> &'static str {
+    if lowered > 0 { "~" } else { "" }
+}
 
 /// Where an answer's lines go, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
@@ -331,11 +333,7 @@ impl<'a, B: Bus> Show<'a, B> {
         };
         self.card.flip();
         self.picture = Some(picture);
-        let mark = if self.stage.lowered() > 0 {
-            LOWERED
-        } else {
-            ""
-        };
+        let mark = lower_mark(self.stage.lowered());
         self.drawn_by = Word::of(format_args!("{}{mark}", self.stage.mapper()));
     }
 

@@ -17,8 +17,8 @@ use scene::font;
 use scene::motion::Motion;
 use texmap::{Mapper, Order};
 
-use crate::KEYS;
 use crate::split::{self, Split};
+use crate::{KEYS, lower_mark};
 
 /// A tick is a sixtieth of a second.
 const TICKS_A_SECOND: u32 = 60;
@@ -397,13 +397,19 @@ impl<'a> Overlay<'a> {
     }
 
     fn write_labels(&mut self, figures: &Figures) {
-        let Figures { mapper, most, .. } = figures;
+        let Figures {
+            mapper,
+            most,
+            lowered,
+            ..
+        } = figures;
+        let mark = lower_mark(lowered.unwrap_or(0));
         let mut write = |ink, x, y, text: fmt::Arguments<'_>| {
             self.writing.write(ink, x, y, text);
         };
         let y = HEIGHT - MARGIN - font::HEIGHT;
         let [left, middle, right] = split::WINDOWS.map(|x| x + MARGIN);
-        write(Ink::Bright, left, y, format_args!("{mapper}"));
+        write(Ink::Bright, left, y, format_args!("{mapper}{mark}"));
         write(Ink::Bright, middle, y, format_args!("exact"));
         let most = Hundredths(*most);
         write(Ink::Bright, right, y, format_args!("most {most} texel"));
@@ -468,8 +474,13 @@ impl<'a> Overlay<'a> {
                 line(ink, format_args!("sweet spot {least} to {most}{verdict}"));
             }
         }
-        if let Some(faces) = lowered {
-            line(Ink::Plain, format_args!("lower quality: {faces} faces"));
+        match lowered {
+            Some(faces) if mapper.lower().is_some() => {
+                line(Ink::Plain, format_args!("faces in lower quality: {faces}"));
+            }
+            // Or the key would seem to do nothing.
+            Some(_) => line(Ink::Plain, format_args!("no lower quality than {mapper}")),
+            None => {}
         }
         if *paused {
             line(Ink::Bright, format_args!("paused"));
@@ -554,6 +565,7 @@ mod tests {
             written += key.name;
             written += key.about;
         }
+        written += lower_mark(1);
         written.extend(CATALOGUE.iter().map(|entry| entry.name));
         written.extend(Mapper::ALL.iter().map(|(name, ..)| *name));
         written.extend(Order::ALL.iter().map(|(name, ..)| *name));
