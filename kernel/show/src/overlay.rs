@@ -465,6 +465,8 @@ impl<'a> Overlay<'a> {
             );
             if let Some((least, most)) = sweet_spot {
                 let (ink, verdict) = match pixels {
+                    // So long after each other that what crawls is half a period off already.
+                    _ if least > most => (Ink::Plain, ": too few frames"),
                     0 => (Ink::Plain, ""),
                     _ if pixels < least => (Ink::Plain, ": too slow"),
                     _ if pixels > most => (Ink::Plain, ": too fast"),
