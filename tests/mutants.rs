@@ -1,5 +1,5 @@
-//! Whether the checks of the emulated VGA, of the Mode X driver, of coverage and of the exact mapper
-//! can fail: `cargo named-mutants`.
+//! Whether the checks of the emulated VGA, of the Mode X driver, of coverage, of mappers that keep to
+//! an error and of visible spans can fail: `cargo named-mutants`.
 //!
 //! A mutant is one mistake that could be made, planted into a copy of the workspace: in the driver,
 //! in the card that should find the driver's mistakes out, or in the renderer. The tests of the
@@ -33,8 +33,14 @@ const DAC: &str = "tests/emulator/src/dac.rs";
 const MEMORY: &str = "tests/emulator/src/memory.rs";
 const SCANOUT: &str = "tests/emulator/src/scanout.rs";
 const SEQUENCER: &str = "tests/emulator/src/sequencer.rs";
+const ADAPTIVE: &str = "kernel/texmap/src/adaptive.rs";
+const BOUNDS: &str = "kernel/texmap/src/bounds.rs";
 const COVERAGE: &str = "kernel/texmap/src/coverage.rs";
 const EXACT: &str = "kernel/texmap/src/exact.rs";
+const PLACES: &str = "kernel/texmap/src/places.rs";
+const RUNS: &str = "kernel/texmap/src/runs.rs";
+const VISIBLE: &str = "kernel/texmap/src/visible.rs";
+const WITHIN: &str = "kernel/texmap/src/within.rs";
 const VGA: &str = "tests/emulator/src/vga.rs";
 const DRIVER: &str = "kernel/modex/src/driver.rs";
 const REGISTERS: &str = "kernel/modex/src/registers.rs";
@@ -43,6 +49,8 @@ const REGISTERS: &str = "kernel/modex/src/registers.rs";
 const CARD: [&str; 2] = ["--package=emulator", "--package=modex"];
 /// The crates whose tests must kill a mutant of coverage or of a mapper.
 const MAPPER: [&str; 2] = ["--package=texmap", "--package=oracle"];
+/// Those whose tests must kill a mutant of what is seen.
+const SEEN: [&str; 2] = ["--package=scene", "--package=oracle"];
 
 /// Columns: name; file; text; what it becomes.
 #[rustfmt::skip]
@@ -184,6 +192,38 @@ const MUTANTS: &[Mutant] = &[
         "(0..len).find(needs_no_clamp).unwrap_or(len)", "(0..len).find(needs_no_clamp).unwrap_or(len).min(0)"),
     mutant("a quotient rounded", EXACT,
         "(a / c) as usize", "((a + c / 2) / c) as usize"),
+    // What keeps to an error, and what is seen.
+    mutant("a line kept that errs too much", ADAPTIVE,
+        "depth > 0 && self.near * self.chords.cut(depth) >= self.least", "depth > 0"),
+    mutant("a clamped end not paid for", ADAPTIVE,
+        "self.chords.least(steps, self.outside.max(there.1))", "self.chords.least(steps, 0)"),
+    mutant("a line from its wrong end", ADAPTIVE,
+        "walk = walk.every(-1, i32::from(len) - 1);", "walk = walk.every(-1, i32::from(steps));"),
+    mutant("a pixel after the lines left out", ADAPTIVE,
+        "let len = self.len - self.done;\n        if len == 0 {",
+        "let len = self.len - self.done;\n        if len < 2 {"),
+    mutant("a line judged by one end alone", BOUNDS,
+        "mean >> 32 == 0 && self.cut(from) * self.cut(to) >= mean * mean",
+        "mean >> 32 == 0 && self.cut(from) >= mean"),
+    mutant("steps that are cut not paid for", BOUNDS,
+        "let spent = u64::from(pixels) + u64::from(outside);", "let spent = u64::from(outside);"),
+    mutant("the error of a line halved", BOUNDS,
+        "exponent + more + 14 -", "exponent + more + 13 -"),
+    mutant("a map's bend not paid for", WITHIN,
+        "off = off.max(bent as i64 + outside + (change >> 28));",
+        "off = off.max(outside + (change >> 28));"),
+    mutant("the dearer axis", WITHIN,
+        "match rows < columns {", "match rows > columns {"),
+    mutant("a reciprocal not rounded down", RUNS,
+        "value: (1 << 63) / (u64::from(high) + 1),", "value: (1 << 63) / u64::from(high),"),
+    mutant("the end of a row left out", PLACES,
+        "for x in 4 * to..end {", "for x in 4 * to + 1..end {"),
+    mutant("the farther face before the nearer", VISIBLE,
+        "at(self) * other.over > at(other) * self.over",
+        "at(self) * other.over < at(other) * self.over"),
+    mutant("faces that change a pixel late", VISIBLE,
+        "column.push(face(above), first, turn);",
+        "column.push(face(above), first, turn.min(last - 1) + 1);"),
 ];
 
 const fn mutant(
@@ -232,7 +272,7 @@ fn every_mutant_has_its_place_in_the_source() {
 #[ignore = "builds and tests for minutes, once for each mutant; by `cargo named-mutants`"]
 fn every_mutant_is_killed() {
     let copy = Copy::new();
-    for packages in [CARD, MAPPER] {
+    for packages in [CARD, MAPPER, SEEN] {
         let run = copy.cargo(&["test"], packages);
         assert!(run.well, "without a mutant:\n{}", run.output);
     }
@@ -322,9 +362,10 @@ impl Copy {
             Err(error) => return Fate::Error(error),
         };
         fs::write(&file, planted).unwrap();
-        let packages = match mutant.file.starts_with("kernel/texmap") {
-            true => MAPPER,
-            false => CARD,
+        let packages = match mutant.file {
+            VISIBLE => SEEN,
+            file if file.starts_with("kernel/texmap") => MAPPER,
+            _ => CARD,
         };
         let built = self.cargo(&["test", "--no-run"], packages);
         let tested = built
