@@ -92,7 +92,7 @@ fn a_recording_has_the_emulated_cards_frames_and_the_same_bytes_each_time() {
         assert_eq!(shown, expected.pixels, "{name}");
     }
 
-    // Six dumps and their PNGs are six pictures.
+    // Six dumps and their PNGs are six pictures, each with its name below.
     let (code, told, errors) =
         crystal_ball(folder.path(), &["replay", "own", "--sheet", "sheet.png"]);
     assert_eq!((code, told.as_str()), (Some(0), "sheet.png\n"), "{errors}");
@@ -100,7 +100,7 @@ fn a_recording_has_the_emulated_cards_frames_and_the_same_bytes_each_time() {
         fs::File::open(at("sheet.png")).unwrap(),
     ));
     let size = sheet.read_info().unwrap().info().size();
-    assert_eq!(size, (3 * 324 + 4, 2 * 244 + 4));
+    assert_eq!(size, (3 * 324 + 4, 2 * 264 + 4));
 }
 
 #[test]
