@@ -21,9 +21,6 @@ mod accesses;
 
 pub use accesses::{Accesses, Emulated, Memories};
 
-/// The orders that the kernel draws in; [`Order::Buffer`] draws as the second does.
-const DRAWN: [Order; 2] = [Order::Polygons, Order::Planes];
-
 /// A CPU model of QEMU's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cpu {
@@ -113,8 +110,7 @@ impl OnCpu {
 pub struct Row {
     /// The mapper.
     pub mapper: Mapper,
-    /// The order. [`Order::Buffer`] has the figures of [`Order::Planes`], as it draws the same, and
-    /// differs in [`Row::whole_frame`] and in `accesses`.
+    /// The order.
     pub order: Order,
     /// What each piece of work took. The references ([`Work::BareRam`], [`Work::BareCard`],
     /// [`Work::Present`]) were done in the same rounds as the others.
@@ -259,7 +255,7 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
     let ready = setup::ready_to_measure(&config.options)?;
     let mut memories = Memories::default();
     let mut emulated = Emulated::new(&mut memories);
-    let all = config.cpus.len() * config.mappers.len() * DRAWN.len() * 2;
+    let all = config.cpus.len() * config.mappers.len() * Order::ALL.len() * 2;
     let mut step = Step::counting("measuring in QEMU", all as u64);
     let mut done = 0..;
     let mut tick = || step.at(done.next().unwrap_or(0));
@@ -286,15 +282,6 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
                 runs: counted.run_costs(&timed, a_tick)?,
                 accesses: emulated.accesses(mapper, order)?,
             });
-            if order == Order::Planes {
-                let order = Order::Buffer;
-                let accesses = emulated.accesses(mapper, order)?;
-                rows.extend(rows.last().cloned().map(|planes| Row {
-                    order,
-                    accesses,
-                    ..planes
-                }));
-            }
         }
         let bmi2 = timing.has_bmi2()?;
         timing.machine.leave()?;
@@ -309,7 +296,7 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
 /// The mappers and orders that the kernel is asked for.
 fn asked(config: &Config) -> impl Iterator<Item = (Mapper, Order)> {
     let mappers = config.mappers.iter();
-    mappers.flat_map(|&mapper| DRAWN.map(|order| (mapper, order)))
+    mappers.flat_map(|&mapper| Order::ALL.map(|(_, order, _)| (mapper, order)))
 }
 
 /// A machine that runs the measuring kernel.

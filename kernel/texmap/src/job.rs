@@ -44,6 +44,11 @@ pub enum Rows {
     Lines,
 }
 
+/// Affine rows of fewer pixels are stepped where the others are drawn by [`Rows::Lines`]: a line in
+/// RAM is made first, and costs as much as some eight planes selected. Runs in the free direction
+/// are mostly such.
+const SHORT_ROW: u16 = 8;
+
 /// How runs are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Style {
@@ -367,7 +372,9 @@ impl Job {
                     });
                 }
             }
-            (Rows::Steps, Walk::Affine(mut walk)) => {
+            (rows, Walk::Affine(mut walk))
+                if rows == Rows::Steps || rows == Rows::Lines && self.len < SHORT_ROW =>
+            {
                 destination.row(self.x, self.y, self.len, || texel(texture, walk.next()));
             }
             (Rows::Passes, _) => {
@@ -501,7 +508,7 @@ impl Coordinates {
 pub struct JobList<const N: usize> {
     jobs: [Job; N],
     len: usize,
-    has_rows: bool,
+    leaves_columns: bool,
     /// For each job and plane the next in the chain: see [`ByPlane`].
     next: [[u16; 4]; N],
 }
@@ -555,7 +562,7 @@ impl<const N: usize> JobList<N> {
         Self {
             jobs: [Self::EMPTY; N],
             len: 0,
-            has_rows: false,
+            leaves_columns: false,
             next: [[0; 4]; N],
         }
     }
@@ -568,13 +575,13 @@ impl<const N: usize> JobList<N> {
         let place = self.jobs.get_mut(self.len).ok_or(job)?;
         *place = job;
         self.len += 1;
-        self.has_rows |= job.axis == Axis::Right;
+        self.leaves_columns |= !job.is_column();
         Ok(())
     }
 
-    /// Whether any of the jobs goes along a row.
-    pub(crate) fn has_rows(&self) -> bool {
-        self.has_rows
+    /// Whether any of the jobs has pixels in more than one column.
+    pub(crate) fn leaves_columns(&self) -> bool {
+        self.leaves_columns
     }
 
     /// The jobs, in the order in which they came.
@@ -602,7 +609,7 @@ impl<const N: usize> JobList<N> {
     /// Empties the list.
     pub fn clear(&mut self) {
         self.len = 0;
-        self.has_rows = false;
+        self.leaves_columns = false;
     }
 }
 

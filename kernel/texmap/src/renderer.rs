@@ -31,8 +31,8 @@ pub enum Order {
     Polygons,
     /// All of plane 0, then of 1, 2 and 3: a plane is selected four times a list.
     Planes,
-    /// The same, into a page in RAM that is then presented in wide stores; a list with rows in it
-    /// as the polygons come. What is drawn on is the caller's to choose.
+    /// The same, into a page in RAM that is then presented in wide stores; if any run of a list
+    /// leaves its column, as the polygons come. What is drawn on is the caller's to choose.
     Buffer,
 }
 
@@ -81,7 +81,7 @@ impl Order {
     ) {
         let tools = mapper.style().tools();
         // In RAM all planes can be reached at once, and a row is drawn whole.
-        let as_they_come = self == Self::Polygons || self == Self::Buffer && jobs.has_rows();
+        let as_they_come = self == Self::Polygons || self == Self::Buffer && jobs.leaves_columns();
         match as_they_come {
             true => {
                 for job in jobs.jobs() {
