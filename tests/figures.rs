@@ -14,7 +14,7 @@ const WATCHED: Duration = Duration::from_secs(60);
 const BOOTS: usize = 5;
 
 #[test]
-#[ignore = "measures for two minutes; run it alone, by `cargo figures`"]
+#[ignore = "measures for five minutes; run it alone, by `cargo figures`"]
 fn figures() {
     let options = Options::default();
     let ready = setup::ready(&options).expect("the set-up");
