@@ -34,6 +34,8 @@ pub struct Entry<'a> {
     cover: Cover<'a>,
     mipmaps: bool,
     pose: fn(u32) -> Pose,
+    /// By how much nearer all looks the same again, 16.16 units; 0 if it does not.
+    tile: i32,
 }
 
 /// The DAC's colours, and what they become in the light.
@@ -118,6 +120,7 @@ impl<'a> Entry<'a> {
             cover: Cover::Loaded(texture),
             mipmaps: false,
             pose: Pose::at_tick,
+            tile: 0,
         }
     }
 
@@ -152,6 +155,21 @@ impl<'a> Entry<'a> {
     pub fn pose(&self, tick: u32) -> Pose {
         (self.pose)(tick)
     }
+
+    /// A pose that looks as `next` does, at the distance that is nearest to that of `pose`.
+    ///
+    /// A walk along tiles goes on from a tile's end at the beginning of the same one. Nothing is seen
+    /// of that in the two pictures; but whoever asks how far it is from one pose to the next would be
+    /// told of a leap back.
+    pub fn following(&self, pose: &Pose, next: Pose) -> Pose {
+        if self.tile == 0 {
+            return next;
+        }
+        let leap = next.distance - pose.distance;
+        let tiles = (leap + self.tile / 2).div_euclid(self.tile);
+        let distance = (next.distance - tiles * self.tile).clamp(0, Pose::MAX_DISTANCE);
+        Pose { distance, ..next }
+    }
 }
 
 impl Entry<'static> {
@@ -175,6 +193,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
         }),
         mipmaps: false,
         pose: Pose::at_tick,
+        tile: 0,
     },
     Entry {
         name: "facing",
@@ -190,6 +209,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
             roll: 0,
             distance: units(23, 10),
         },
+        tile: 0,
     },
     Entry {
         name: "tilted",
@@ -205,6 +225,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
             roll: 0,
             distance: units(23, 10),
         },
+        tile: 0,
     },
     Entry {
         name: "grazing-16",
@@ -220,6 +241,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
             roll: sway(tick, 10),
             distance: FAR_16 - FLOOR_16_HALF,
         },
+        tile: 0,
     },
     Entry {
         name: "grazing-4096",
@@ -235,6 +257,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
             roll: sway(tick, 10),
             distance: FAR_4096 - FLOOR_4096_HALF,
         },
+        tile: 0,
     },
     Entry {
         name: "wall",
@@ -250,6 +273,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
             roll: 0,
             distance: units(21, 10),
         },
+        tile: 0,
     },
     Entry {
         name: "cube",
@@ -266,6 +290,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
             // 2.25 to 4.25 units: its corners are 1.73 from the middle.
             distance: units(13, 4) - (sin(turn(tick)) >> 14) as i32,
         },
+        tile: 0,
     },
     Entry {
         name: "knot",
@@ -281,6 +306,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
             roll: 20 * DEGREE,
             distance: units(31, 10),
         },
+        tile: 0,
     },
     Entry {
         name: "corridor",
@@ -291,6 +317,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
         cover: Cover::Painted(corridor::paint),
         mipmaps: true,
         pose: stroll,
+        tile: TILE,
     },
     Entry {
         name: "moire",
@@ -301,6 +328,7 @@ pub static CATALOGUE: [Entry<'static>; 10] = [
         cover: Cover::Painted(corridor::paint),
         mipmaps: false,
         pose: stroll,
+        tile: TILE,
     },
 ];
 
@@ -324,15 +352,18 @@ fn sway(tick: u32, degrees: u32) -> u32 {
     ((sine * i64::from(degrees * DEGREE)) >> 30) as u32
 }
 
+/// A tile of the corridor's floor and walls, 16.16 units.
+const TILE: i32 = 1 << 16;
+
 /// A tile of the corridor forward in three quarters of a second, and a look to either side: seamless,
 /// since all tiles are alike.
 fn stroll(tick: u32) -> Pose {
-    const TILE: u32 = 45;
+    const TICKS: u32 = 45;
     Pose {
         yaw: sway(tick, 9),
         pitch: 0,
         roll: sway(tick.wrapping_mul(2), 1),
-        distance: units(3, 1) - ((tick % TILE) << 16) as i32 / TILE as i32,
+        distance: units(3, 1) - (tick % TICKS) as i32 * TILE / TICKS as i32,
     }
 }
 

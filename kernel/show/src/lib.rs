@@ -346,9 +346,8 @@ impl<'a, B: Bus> Show<'a, B> {
         } else {
             name(&pose)
         };
-        let next = tick.wrapping_add(1);
         self.stage
-            .lower_for(self.state.lower.then(|| self.state.pose(next)));
+            .lower_for(self.state.lower.then(|| self.state.next_pose(tick)));
         let overlay = self.pace.is_some() && self.prepare_overlay(tick);
         self.draw(picture, &pose, overlay);
     }
@@ -368,7 +367,7 @@ impl<'a, B: Bus> Show<'a, B> {
             map_masks: counts.draw.map_mask + counts.erase.map_mask,
         };
         self.overlay.prepare(tick, &figures, || {
-            stage.motion(&state.pose(tick), &state.pose(tick.wrapping_add(1)))
+            stage.motion(&state.pose(tick), &state.next_pose(tick))
         })
     }
 

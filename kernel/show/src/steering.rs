@@ -111,14 +111,22 @@ impl Motion {
     }
 
     /// The pose at the motion's own tick.
-    fn pose(&self, own: impl Fn(u32) -> Pose) -> Pose {
+    fn pose(&self, entry: &Entry<'_>) -> Pose {
         let tick = (self.time >> 16) as u32;
         let part = i64::from(self.time as u32 % ONE);
-        let own = match part {
-            0 => own(tick),
+        let own = entry.pose(tick);
+        self.steered(match part {
+            0 => own,
             // A slow scene would stand still for ticks, and then jump.
-            _ => between(&own(tick), &own(tick.wrapping_add(1)), part),
-        };
+            _ => {
+                let next = entry.pose(tick.wrapping_add(1));
+                between(&own, &entry.following(&own, next), part)
+            }
+        })
+    }
+
+    /// The scene's own pose, turned and moved.
+    fn steered(&self, own: Pose) -> Pose {
         let [yaw, pitch, roll] = self.turned;
         Pose {
             yaw: own.yaw.wrapping_add(yaw),
@@ -155,8 +163,8 @@ impl Motion {
     }
 
     /// Moves by `step`, as far as the pose stays legal.
-    fn approach(&mut self, step: i32, own: impl Fn(u32) -> Pose) {
-        let here = self.pose(own).distance;
+    fn approach(&mut self, step: i32, entry: &Entry<'_>) {
+        let here = self.pose(entry).distance;
         self.distance += (here + step).clamp(0, Pose::MAX_DISTANCE) - here;
     }
 }
@@ -253,7 +261,13 @@ impl<'a> State<'a> {
 
     /// The pose at a tick, not before the last change.
     pub fn pose(&self, tick: u32) -> Pose {
-        self.motion.at(tick).pose(|tick| self.entry.pose(tick))
+        self.motion.at(tick).pose(&self.entry)
+    }
+
+    /// The pose at the next tick, as one to which it moves there.
+    pub fn next_pose(&self, tick: u32) -> Pose {
+        let next = self.pose(tick.wrapping_add(1));
+        self.entry.following(&self.pose(tick), next)
     }
 
     /// Whether nothing moves until that is said again.
@@ -302,8 +316,8 @@ impl<'a> State<'a> {
             Action::Pause => motion.paused = !motion.paused,
             Action::Step if motion.paused => *motion = motion.after(1),
             Action::Step => motion.paused = true,
-            Action::Nearer => motion.approach(-STEP, |tick| entry.pose(tick)),
-            Action::Farther => motion.approach(STEP, |tick| entry.pose(tick)),
+            Action::Nearer => motion.approach(-STEP, &entry),
+            Action::Farther => motion.approach(STEP, &entry),
             Action::NextScene => {
                 let next = self.scenes.after(&entry);
                 self.put(next);
@@ -591,7 +605,7 @@ mod tests {
                 roll: 0,
                 distance: 4 * UNIT,
             };
-            let turned = state.motion.at(10).pose(|_| level);
+            let turned = state.motion.at(10).steered(level);
             let [to_x, to_y, _] = turned.orientation().turn(point);
             let near = |to: i32, from: i32| {
                 if (to - from).abs() < 300 {
@@ -635,6 +649,29 @@ mod tests {
             }),
             normal
         );
+    }
+
+    /// At any speed a walk along tiles goes on where they begin again: no pose between two of its
+    /// own is one that lies back, and no two in a row are a tile apart.
+    #[test]
+    fn a_walk_has_no_leap_at_a_tile_s_end() {
+        let mut state = own(0);
+        while state.entry.name != "corridor" {
+            act(&mut state, 0, Action::NextScene);
+        }
+        act(&mut state, 0, Action::Faster);
+        for tick in 0..400 {
+            let (here, next) = (state.pose(tick).distance, state.next_pose(tick).distance);
+            assert!(
+                (1000..2000).contains(&(here - next)),
+                "{tick}: {here} to {next}"
+            );
+            let shown = state.pose(tick + 1).distance;
+            assert!(
+                shown == next || shown == next + (1 << 16),
+                "{tick}: {shown}"
+            );
+        }
     }
 
     #[test]
