@@ -167,14 +167,16 @@ pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
     let luma = palette.map(|[r, g, b]| 5 * i64::from(r) + 9 * i64::from(g) + 2 * i64::from(b));
     let pitch = usize::from(texture.pitch());
     let at = |i: usize, j: usize| luma[usize::from(texture.texels()[j * pitch + i])];
+    // Every scene passes here before its first picture: no division for a texel.
+    let after = |i: usize, side: usize| if i + 1 == side { 0 } else { i + 1 };
     let (mut sum, mut squares, mut across, mut down) = (0, 0, 0, 0);
     for j in 0..height {
         for i in 0..width {
             let here = at(i, j);
             sum += here;
             squares += here * here;
-            across += (at((i + 1) % width, j) - here).pow(2);
-            down += (at(i, (j + 1) % height) - here).pow(2);
+            across += (at(after(i, width), j) - here).pow(2);
+            down += (at(i, after(j, height)) - here).pow(2);
         }
     }
     // Below 65 536 texels of 2^10 squared, once more times 65 536: fits.
