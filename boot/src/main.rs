@@ -280,7 +280,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             setup::clean(&mut Output)?;
         }
         Some(Subcommands::Dump(frames)) => {
-            let pack = load_to_boot(&files, &mut options)?;
+            let pack = checksum(&load_to_boot(&files, &mut options)?);
             let ready = setup::ready(&options)?;
             let mut machine = Machine::boot(&Config {
                 vga: cli.boot.vga,
@@ -303,16 +303,14 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
                 say(format_args!("error: {error}"));
                 return Ok(ExitCode::from(2));
             }
-            let pack = load_to_boot(&files, &mut options)?;
+            let model = load_to_boot(&files, &mut options)?;
             let ready = setup::ready(&options)?;
             let mut machine = Machine::boot(&Config {
                 vga: cli.boot.vga,
-                pack,
+                pack: checksum(&model),
                 arguments: cli.qemu_arguments,
                 ..Config::new(&ready)
             })?;
-            // What it is has been told.
-            let model = files.load()?;
             let pack = model.as_ref().map(Model::pack);
             let mut memory = card::memory();
             let mut emulated = Emulated::with(&mut memory, pack.as_ref())?;
@@ -356,7 +354,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             write_image(&setup::image(&options)?, &out)?;
         }
         None => {
-            let pack = load_to_boot(&files, &mut options)?;
+            let pack = checksum(&load_to_boot(&files, &mut options)?);
             options.window = !cli.boot.headless && has_display();
             let ready = setup::ready(&options)?;
             let config = Config {
@@ -380,19 +378,23 @@ fn load(files: &Files) -> anyhow::Result<Option<Model>> {
     Ok(model)
 }
 
-/// The same, to be the ramdisk of the image; tells what that costs. Returns its pack's checksum.
-fn load_to_boot(files: &Files, options: &mut Options) -> anyhow::Result<Option<u32>> {
-    let Some(model) = load(files)? else {
-        return Ok(None);
-    };
-    say(format_args!(
-        "with its {} KiB the boot takes about {:.2} s longer",
-        model.bytes.len().div_ceil(1024),
-        model.boot_seconds()
-    ));
-    let checksum = model.pack().checksum();
-    options.ramdisk = Some(model.bytes);
-    Ok(Some(checksum))
+/// The same, which is to be the ramdisk of the image, too; tells what that costs.
+fn load_to_boot(files: &Files, options: &mut Options) -> anyhow::Result<Option<Model>> {
+    let model = load(files)?;
+    if let Some(model) = &model {
+        say(format_args!(
+            "with its {} KiB the boot takes about {:.2} s longer",
+            model.bytes.len().div_ceil(1024),
+            model.boot_seconds()
+        ));
+        options.ramdisk = Some(model.bytes.clone());
+    }
+    Ok(model)
+}
+
+/// The checksum of a model's pack.
+fn checksum(model: &Option<Model>) -> Option<u32> {
+    model.as_ref().map(|model| model.pack().checksum())
 }
 
 /// A file was written: its path goes where the next program in a pipe reads it.
