@@ -268,6 +268,20 @@ fn a_triple_fault_is_no_success() {
 }
 
 #[test]
+fn an_adapter_that_does_not_take_the_mode_is_named() {
+    let judged = failure(Fault::Adapter);
+    let Verdict::Adapter { report } = &judged.0.verdict else {
+        panic!("{}", judged.0);
+    };
+    assert_eq!(
+        report[0],
+        "adapter does not take Mode X: the window at A0000h is not planar: at offset 0000 plane 0 \
+         reads 54 after 51 was stored"
+    );
+    assert_eq!(judged.0.verdict.exit_code(), 17);
+}
+
+#[test]
 fn a_hang_is_noticed() {
     let judged = failure(Fault::Hang);
     let waited_for = "the answer to 'fail hang'".into();

@@ -95,7 +95,7 @@ impl<'a> Emulated<'a> {
     /// As [`Emulated::new`].
     pub fn with(memory: &'a mut Memory, pack: Option<&Pack<'a>>) -> anyhow::Result<Self> {
         let mut this = Self {
-            show: Show::new(memory, Vga::new(), pack),
+            show: Show::new(memory, Vga::new(), pack)?,
             pack: pack.map(Pack::checksum),
         };
         this.ask(Command::Hold)?;

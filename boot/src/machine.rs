@@ -30,8 +30,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
 use link::{
-    Command, Content, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, LOADED, Lines, OK, PANIC,
-    REFUSED, RUNNING,
+    ADAPTER, Command, Content, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, LOADED, Lines, OK,
+    PANIC, REFUSED, RUNNING,
 };
 use rustix::process::{Pid, Signal, kill_process_group, test_kill_process};
 use serde_json::{Value, json};
@@ -462,7 +462,7 @@ impl Machine {
             }
         } else if [LOADED, REFUSED].contains(&word) {
             self.seen.pack = Some(line);
-        } else if [PANIC, EXCEPTION].contains(&word) || !self.seen.report.is_empty() {
+        } else if [PANIC, EXCEPTION, ADAPTER].contains(&word) || !self.seen.report.is_empty() {
             let whole = line == END_OF_REPORT;
             self.seen.report.push(line);
             if whole {
@@ -508,6 +508,9 @@ impl Machine {
                 report: std::mem::take(&mut seen.report),
             },
             (Some(Exit::Exception), _) => Verdict::Exception {
+                report: std::mem::take(&mut seen.report),
+            },
+            (Some(Exit::Adapter), _) => Verdict::Adapter {
                 report: std::mem::take(&mut seen.report),
             },
             (_, Some("guest-reset")) if seen.hello => Verdict::TripleFault { booted: false },

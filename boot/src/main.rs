@@ -64,7 +64,8 @@ Examples (`cargo run -- ` hands on what follows):
   cargo run --release -- trade         what accuracy costs: tables, plots, pictures
 
 Exit codes: 0 done; 1 set-up failed; 2 wrong usage; 10 panic; 11 CPU exception; 12 triple fault;
-13 hang; 14 stopped in the boot loader; 15 QEMU failed; 16 serial line garbled; 130 ended by you.";
+13 hang; 14 stopped in the boot loader; 15 QEMU failed; 16 serial line garbled;
+17 the display adapter does not take Mode X; 130 ended by you.";
 
 const DOCTOR_HELP: &str = "\
 Examples:

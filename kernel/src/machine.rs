@@ -14,6 +14,7 @@ use core::ptr::NonNull;
 use bootloader_api::config::Mapping;
 use bootloader_api::{BootInfo, BootloaderConfig};
 use link::{Exit, HELLO, PROTOCOL};
+use modex::SetError;
 
 pub use vga::Window;
 
@@ -105,6 +106,13 @@ pub fn fail(fault: link::Fault) -> ! {
         link::Fault::PageFault => cpu::page_fault(),
         link::Fault::StackOverflow => cpu::stack_overflow(),
         link::Fault::TripleFault => cpu::triple_fault(),
+        // What mode set returns where RAM lies in place of the window.
+        link::Fault::Adapter => report::adapter(SetError::Plane {
+            plane: 0,
+            at: 0,
+            expected: 0x51,
+            actual: 0x54,
+        }),
         link::Fault::Hang => stop(),
     }
 }

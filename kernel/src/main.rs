@@ -27,7 +27,8 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     let machine = machine::init(boot_info);
     let mut memory = MEMORY.lock();
     let pack = machine.ramdisk.and_then(taken);
-    let mut show = Show::new(&mut memory, machine.vga, pack.as_ref());
+    let mut show = Show::new(&mut memory, machine.vga, pack.as_ref())
+        .unwrap_or_else(|error| machine::report::adapter(error));
     let out: &mut show::Out<'_> = &mut |line| serial::line(line);
     let stopwatch = clock::Stopwatch::start(timer::ticks());
     loop {

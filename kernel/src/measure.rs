@@ -19,7 +19,8 @@ static BOOT: BootloaderConfig = machine::BOOT;
 fn start(boot_info: &'static mut BootInfo) -> ! {
     let machine = machine::init(boot_info);
     let mut memory = MEMORY.lock();
-    let mut bench = Bench::new(&mut memory, machine.vga);
+    let mut bench = Bench::new(&mut memory, machine.vga)
+        .unwrap_or_else(|error| machine::report::adapter(error));
     let clock = Clock {
         now: clock::now,
         instructions: clock::instructions,

@@ -26,6 +26,11 @@ pub enum Verdict {
         /// The kernel's last words.
         report: Vec<String>,
     },
+    /// The display adapter does not take Mode X.
+    Adapter {
+        /// The kernel's last words.
+        report: Vec<String>,
+    },
     /// The machine reset itself with the kernel running.
     TripleFault {
         /// Whether it was seen to boot again, and not only to reset.
@@ -66,6 +71,7 @@ impl Verdict {
             Self::BootLoader { .. } => 14,
             Self::Qemu { .. } => 15,
             Self::Garbled { .. } => 16,
+            Self::Adapter { .. } => 17,
             // As a shell reports Ctrl-C.
             Self::User => 130,
         }
@@ -80,6 +86,12 @@ impl fmt::Display for Verdict {
             Self::Exception { report } => {
                 write!(f, "the CPU raised an exception in the kernel{}", Indented(report))
             }
+            Self::Adapter { report } => write!(
+                f,
+                "the display adapter does not take Mode X{}\nQEMU 10.0 shows RAM in place of video \
+                 memory with `-machine smm=off`: leave that out, or use `-vga std`",
+                Indented(report)
+            ),
             Self::TripleFault { booted: false } => f.write_str(
                 "the machine reset itself: a triple fault (an exception that the kernel could not even report)",
             ),

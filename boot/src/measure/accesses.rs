@@ -47,10 +47,11 @@ const NO_CLOCK: Clock = Clock {
 impl<'a> Emulated<'a> {
     /// Cards as after the mode set.
     pub fn new(memories: &'a mut Memories) -> Self {
+        let taken = "the emulated card takes Mode X";
         let counted = Counted::new(Vga::new());
         Self {
-            counted: Bench::new(&mut memories.counted, counted),
-            plain: Bench::new(&mut memories.plain, Vga::new()),
+            counted: Bench::new(&mut memories.counted, counted).expect(taken),
+            plain: Bench::new(&mut memories.plain, Vga::new()).expect(taken),
         }
     }
 

@@ -4,7 +4,7 @@ use core::fmt;
 use core::hint::black_box;
 
 use link::{Checksum, ERROR, Lines, OK};
-use modex::{Bus, Destination, HEIGHT, ModeX, Offscreen, PlanarBuffer, WIDTH};
+use modex::{Bus, Destination, HEIGHT, ModeX, Offscreen, PlanarBuffer, SetError, WIDTH};
 use scene::{Pose, Stage, Storage};
 use texmap::{Job, JobList, Mapper, Order, Stats, Texture};
 
@@ -91,16 +91,13 @@ pub struct Bench<'a, B> {
 impl<'a, B: Bus> Bench<'a, B> {
     /// Paints the textures into `memory` and sets the card's mode.
     ///
-    /// # Panics
-    /// If the card does not read back as it was set.
-    pub fn new(memory: &'a mut Memory, bus: B) -> Self {
+    /// # Errors
+    /// As [`ModeX::set`].
+    pub fn new(memory: &'a mut Memory, bus: B) -> Result<Self, SetError> {
         let ball = [scene::paint_ball(&mut memory.ball)];
         let stage = Stage::new(&mut memory.storage, scene::ball(&ball));
-        let card = match ModeX::set(bus, stage.palette()) {
-            Ok(card) => card,
-            Err(readback) => panic!("Mode X is not set: {readback}"),
-        };
-        Self {
+        let card = ModeX::set(bus, stage.palette())?;
+        Ok(Self {
             card,
             stage,
             pose: Pose::at_tick(FRAME),
@@ -111,7 +108,7 @@ impl<'a, B: Bus> Bench<'a, B> {
             page: &mut memory.page,
             offscreen: &mut memory.offscreen,
             lines: Lines::new(),
-        }
+        })
     }
 
     /// The card's bus.

@@ -218,18 +218,21 @@ pub enum Fault {
     StackOverflow,
     /// `triple-fault`
     TripleFault,
+    /// `adapter`: as if the display adapter did not take Mode X.
+    Adapter,
     /// `hang`
     Hang,
 }
 
 impl Fault {
     /// Every fault with its name on the line.
-    pub const ALL: [(&'static str, Self); 6] = [
+    pub const ALL: [(&'static str, Self); 7] = [
         ("panic", Self::Panic),
         ("panic-in-line", Self::PanicInLine),
         ("page-fault", Self::PageFault),
         ("stack-overflow", Self::StackOverflow),
         ("triple-fault", Self::TripleFault),
+        ("adapter", Self::Adapter),
         ("hang", Self::Hang),
     ];
 }

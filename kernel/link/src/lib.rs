@@ -43,7 +43,8 @@
 //! - `loaded pack 1a2b3c4d`, with the pack's checksum, or `refused pack: ...`, and why: if the
 //!   boot loader brought a ramdisk, right after it;
 //! - `running`: the first picture is on the screen;
-//! - `panic ...`, `exception ...`, and lines that explain it, then [`END_OF_REPORT`].
+//! - `panic ...`, `exception ...`, `adapter ...`, and lines that explain it, then
+//!   [`END_OF_REPORT`].
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -75,7 +76,9 @@ pub const RUNNING: &str = "running";
 pub const PANIC: &str = "panic";
 /// First word of an exception's first line.
 pub const EXCEPTION: &str = "exception";
-/// The last line of a panic's or exception's report. The kernel then waits, for a bounded time,
+/// First word of the first line of the report that the display adapter does not take Mode X.
+pub const ADAPTER: &str = "adapter";
+/// The last line of a panic's, an exception's or an adapter's report. The kernel then waits, for a bounded time,
 /// for [`ACKNOWLEDGE`].
 pub const END_OF_REPORT: &str = "end of report";
 /// The byte (ACK) by which the host says that it has taken its last screendump.
@@ -100,6 +103,8 @@ pub enum Exit {
     Panic = 0x11,
     /// A CPU exception.
     Exception = 0x12,
+    /// The display adapter does not take Mode X.
+    Adapter = 0x13,
 }
 
 impl Exit {
@@ -113,7 +118,7 @@ impl Exit {
 
     /// The exit that QEMU's exit code stands for.
     pub fn from_code(code: i32) -> Option<Self> {
-        [Self::Left, Self::Panic, Self::Exception]
+        [Self::Left, Self::Panic, Self::Exception, Self::Adapter]
             .into_iter()
             .find(|exit| exit.code() == code)
     }

@@ -22,33 +22,62 @@ const GROUP_BYTES: usize = 8;
 const GROUPS: usize = STRIDE / GROUP_BYTES;
 const GROUP_PIXELS: u16 = 4 * GROUP_BYTES as u16;
 
-/// A register that did not read back as it was written.
+/// Why Mode X is not set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Readback {
-    /// The block, as [`Mode::blocks`] names it.
-    pub block: &'static str,
-    /// The register's index in the block.
-    pub index: u8,
-    /// What the mode's table says.
-    pub expected: u8,
-    /// What the card says.
-    pub actual: u8,
+pub enum SetError {
+    /// A register does not read back the value that was written.
+    Register {
+        /// The block, as [`Mode::blocks`] names it.
+        block: &'static str,
+        /// The register's index in the block.
+        index: u8,
+        /// The value in the mode's table.
+        expected: u8,
+        /// The value that the card returned.
+        actual: u8,
+    },
+    /// The window at A0000h is not four planes of 64 KiB: a byte of a plane does not hold the value
+    /// that was stored through Map Mask. RAM in place of the window looks like this, since it keeps
+    /// one byte where the card keeps four.
+    Plane {
+        /// The plane, 0 to 3.
+        plane: u8,
+        /// The byte's offset in the window.
+        at: u16,
+        /// The value that was stored in this plane.
+        expected: u8,
+        /// The value that the load through Read Map returned.
+        actual: u8,
+    },
 }
 
-impl fmt::Display for Readback {
+impl fmt::Display for SetError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            block,
-            index,
-            expected,
-            actual,
-        } = self;
-        write!(
-            f,
-            "{block} register {index:02X} reads {actual:02X} after {expected:02X} was written"
-        )
+        match self {
+            Self::Register {
+                block,
+                index,
+                expected,
+                actual,
+            } => write!(
+                f,
+                "{block} register {index:02X} reads {actual:02X} after {expected:02X} was written"
+            ),
+            Self::Plane {
+                plane,
+                at,
+                expected,
+                actual,
+            } => write!(
+                f,
+                "the window at A0000h is not planar: at offset {at:04X} plane {plane} reads \
+                 {actual:02X} after {expected:02X} was stored"
+            ),
+        }
     }
 }
+
+impl core::error::Error for SetError {}
 
 /// What a page was drawn on since it last held the bare background: in each group of 32 pixel
 /// columns the lines from a top to a bottom. Both only ever grow, and from zero: a lane is added
@@ -152,7 +181,7 @@ impl<B: Bus> ModeX<B> {
     ///
     /// # Errors
     /// As [`ModeX::reset`].
-    pub fn set(bus: B, palette: &Palette) -> Result<Self, Readback> {
+    pub fn set(bus: B, palette: &Palette) -> Result<Self, SetError> {
         let mut card = Self {
             bus,
             drawn: [Drawn::EVERYTHING; PAGES],
@@ -164,17 +193,18 @@ impl<B: Bus> ModeX<B> {
         Ok(card)
     }
 
-    /// Sets the mode, reads it back, loads the palette and clears all four planes; page 0 is
-    /// shown. What follows depends on nothing that was before.
+    /// Sets the mode, reads it back, proves that the window is planar, loads the palette and clears
+    /// all four planes; page 0 is shown. What follows depends on nothing that was before.
     ///
     /// # Errors
-    /// The first register that reads back wrong.
-    pub fn reset(&mut self, palette: &Palette) -> Result<(), Readback> {
+    /// The first register that reads back wrong, or the first byte of a plane that does.
+    pub fn reset(&mut self, palette: &Palette) -> Result<(), SetError> {
         let bus = &mut self.bus;
         bus.purpose(Purpose::Setup);
         leave_linear_mode(bus);
         write_mode(bus, &MODE_X);
         check_mode(bus, &MODE_X)?;
+        check_planes(bus)?;
         write_palette(bus, palette);
         for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
             bus.store64(at as u16, 0);
@@ -513,7 +543,7 @@ fn read_indexed<B: Bus>(bus: &mut B, port: u16, values: &mut [u8]) {
     }
 }
 
-fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), Readback> {
+fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), SetError> {
     let mut expected = *mode;
     expected.sequencer[usize::from(CLOCKING_MODE)] |= SCREEN_DISABLE;
     let actual = read_mode(bus);
@@ -522,7 +552,7 @@ fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), Readback> {
     for ((block, expected), (_, actual)) in expected.blocks().into_iter().zip(actual.blocks()) {
         for (index, (&expected, &actual)) in (0..).zip(expected.iter().zip(actual)) {
             if expected != actual {
-                return Err(Readback {
+                return Err(SetError::Register {
                     block,
                     index,
                     expected,
@@ -531,5 +561,42 @@ fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), Readback> {
             }
         }
     }
+    Ok(())
+}
+
+/// Proves that the window is four planes of 64 KiB: stores a different byte in each plane, at the
+/// start of each half of the window, through Map Mask, and loads each through Read Map. All eight
+/// bytes differ, so no plane can stand in for another plane, nor one half for the other.
+///
+/// The registers alone prove nothing about the window: they read back right while a machine shows
+/// RAM at A0000h.
+fn check_planes<B: Bus>(bus: &mut B) -> Result<(), SetError> {
+    const HALVES: [u16; 2] = [0, (PLANE_BYTES / 2) as u16];
+    let bytes = || {
+        let places = HALVES
+            .into_iter()
+            .flat_map(|at| (0..4).map(move |plane| (at, plane)));
+        // Not 00 or FF, which a window with nothing behind it reads.
+        places.zip(0x51..)
+    };
+    for ((at, plane), byte) in bytes() {
+        write(bus, SEQUENCER, MAP_MASK, 1 << plane);
+        bus.lane::<1>(at, 1, |lane| lane.fill(|| byte));
+    }
+    for ((at, plane), expected) in bytes() {
+        write(bus, GRAPHICS, READ_MAP, plane);
+        let actual = bus.load8(at);
+        if actual != expected {
+            return Err(SetError::Plane {
+                plane,
+                at,
+                expected,
+                actual,
+            });
+        }
+    }
+    let (map_mask, read_map) = (usize::from(MAP_MASK), usize::from(READ_MAP));
+    write(bus, SEQUENCER, MAP_MASK, MODE_X.sequencer[map_mask]);
+    write(bus, GRAPHICS, READ_MAP, MODE_X.graphics[read_map]);
     Ok(())
 }

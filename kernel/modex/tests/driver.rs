@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use modex::registers::*;
 use modex::{
     Bus, Counted, Destination, HEIGHT, Lane, Line, ModeX, Offscreen, PAGE_BYTES, PAGES,
-    PLANE_BYTES, PlanarBuffer, STRIDE, Tally, WIDTH, Window,
+    PLANE_BYTES, PlanarBuffer, STRIDE, SetError, Tally, WIDTH, Window,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,6 +31,22 @@ struct Recorder {
     /// A register that does not hold what is written.
     stuck: Option<(u16, u8)>,
     dispi: bool,
+    window: Behind,
+}
+
+/// What the window at A0000h shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Behind {
+    /// Four planes of 64 KiB.
+    Planes,
+    /// RAM: one byte at each address, whatever Map Mask and Read Map say.
+    Ram,
+    /// No device: stores vanish, and loads return this byte.
+    Nothing(u8),
+    /// Four planes of 32 KiB, each of them twice.
+    Half,
+    /// Planes whose stores reach all of them.
+    Unmasked,
 }
 
 impl Recorder {
@@ -44,13 +60,29 @@ impl Recorder {
             status: vec![VERTICAL_RETRACE | DISPLAY_DISABLED, 0],
             stuck: None,
             dispi: true,
+            window: Behind::Planes,
+        }
+    }
+
+    /// Where a byte of the window lies in each plane.
+    fn place(&self, at: usize) -> usize {
+        match self.window {
+            Behind::Half => at % (PLANE_BYTES / 2),
+            _ => at,
         }
     }
 
     fn store(&mut self, at: usize, value: u8) {
         let mask = self.registers.get(&(SEQUENCER, MAP_MASK)).copied();
+        let mask = match self.window {
+            Behind::Ram => 1,
+            Behind::Nothing(_) => 0,
+            Behind::Unmasked => ALL_PLANES,
+            _ => mask.unwrap_or(0),
+        };
+        let at = self.place(at);
         for (plane, bytes) in self.planes.iter_mut().enumerate() {
-            if mask.unwrap_or(0) >> plane & 1 == 1 {
+            if mask >> plane & 1 == 1 {
                 bytes[at] = value;
             }
         }
@@ -120,7 +152,12 @@ impl Bus for Recorder {
 
     fn load8(&mut self, at: u16) -> u8 {
         self.log.push(Access::Load(at));
-        let plane = self.registers[&(GRAPHICS, READ_MAP)];
+        let plane = match self.window {
+            Behind::Ram => 0,
+            Behind::Nothing(byte) => return byte,
+            _ => self.registers[&(GRAPHICS, READ_MAP)],
+        };
+        let at = self.place(at.into()) as u16;
         self.planes[usize::from(plane)][usize::from(at)]
     }
 
@@ -199,10 +236,34 @@ fn a_register_that_does_not_hold_is_named() {
         let mut recorder = Recorder::new();
         recorder.stuck = Some(stuck);
         let error = ModeX::set(&mut recorder, &BLACK).unwrap_err();
-        assert_eq!((error.block, error.index), (block, stuck.1));
-        assert_eq!(error.actual, 0);
-        let told = format!("{block} register {:02X} reads 00 after", error.index);
+        let index = stuck.1;
+        let told = format!("{block} register {index:02X} reads 00 after");
         assert!(error.to_string().starts_with(&told), "{error}");
+    }
+}
+
+#[test]
+fn a_window_that_is_not_planar_is_named() {
+    let plane = |plane, at, expected, actual| SetError::Plane {
+        plane,
+        at,
+        expected,
+        actual,
+    };
+    for (window, expected) in [
+        // The last store at this address is what RAM keeps.
+        (Behind::Ram, plane(0, 0, 0x51, 0x54)),
+        (Behind::Unmasked, plane(0, 0, 0x51, 0x54)),
+        (Behind::Nothing(0xFF), plane(0, 0, 0x51, 0xFF)),
+        (Behind::Nothing(0x00), plane(0, 0, 0x51, 0x00)),
+        (Behind::Half, plane(0, 0, 0x51, 0x55)),
+    ] {
+        let mut recorder = Recorder::new();
+        recorder.window = window;
+        let error = ModeX::set(&mut recorder, &BLACK).unwrap_err();
+        assert_eq!(error, expected, "{window:?}");
+        let words = "the window at A0000h is not planar: at offset 0000 plane 0 reads ";
+        assert!(error.to_string().starts_with(words), "{error}");
     }
 }
 
@@ -485,6 +546,7 @@ fn pixels_come_back_from_their_planes_and_nothing_is_stored() {
         }
     }
     recorder.log.clear();
+    card.bus().take_counts();
     // Across the end of the planes.
     let mut pixels = [0; 24];
     card.load(0xFFFE, &mut pixels);
@@ -526,16 +588,20 @@ fn every_write_is_counted_once_for_its_purpose() {
     assert_eq!(erase, tallies(1, 1, page / 8, page));
     assert_eq!(overlay, tallies(1, 1, 10, 10));
     assert_eq!(flip, tallies(1, 0, 0, 0));
-    // The rest is the mode set's: Map Mask once, and all of the planes.
+    // The rest is the mode set's: all of the planes are cleared. The proof that they are planes
+    // takes a store and a load of eight bytes, with Map Mask before each store and once at its end.
+    let proof = 8;
     let planes = PLANE_BYTES as u64;
     let log = &counted.inner().log;
     let ports = log
         .iter()
         .filter(|a| matches!(a, Access::Out8(..) | Access::Out16(..)));
-    assert_eq!(
-        setup,
-        tallies(ports.count() as u64 - 4, 1, planes / 8, planes)
-    );
+    let (stores, bytes) = (planes / 8 + proof, planes + proof);
+    let expected = Tally {
+        loads: proof,
+        ..tallies(ports.count() as u64 - 4, 1 + proof + 1, stores, bytes)
+    };
+    assert_eq!(setup, expected);
 }
 
 /// Whatever is drawn, in whatever shape: a window shows what a whole picture has in its columns,

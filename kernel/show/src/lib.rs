@@ -25,7 +25,7 @@ use link::{
     Action, Change, Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting,
     Word,
 };
-use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, Readback, Tally, WIDTH};
+use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, SetError, Tally, WIDTH};
 use pack::{Arena, Pack};
 use scene::catalogue::{Entry, MAX_TEXELS};
 use scene::{Pose, Stage, Storage};
@@ -133,15 +133,15 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Paints the default scene into `memory` and sets the card's mode. The show runs. With a
     /// `pack` its model is a scene beside the built-in ones, and the default; otherwise the ball is.
     ///
-    /// # Panics
-    /// If the card does not read back as it was set: it can't be drawn on.
-    pub fn new(memory: &'a mut Memory, bus: B, pack: Option<&Pack<'a>>) -> Self {
+    /// # Errors
+    /// As [`ModeX::set`]: nothing can be drawn on this card.
+    pub fn new(memory: &'a mut Memory, bus: B, pack: Option<&Pack<'a>>) -> Result<Self, SetError> {
         let arena = &mut memory.model;
         let scenes = Scenes::new(pack.map(|pack| pack.entry(arena)));
         let state = State::of(scenes, scenes.default());
         let textures = state.entry.paint(&mut memory.texels);
         let stage = Stage::new(&mut memory.storage, state.entry.scene(&textures));
-        Self {
+        Ok(Self {
             pack: pack.map(Pack::checksum),
             state,
             log: Log::new(state, &mut memory.notes),
@@ -149,7 +149,7 @@ impl<'a, B: Bus> Show<'a, B> {
             keyboard: Keyboard::new(),
             codes: (0, 0),
             texels: &mut memory.texels,
-            card: expect(ModeX::set(Counted::new(bus), stage.palette())),
+            card: ModeX::set(Counted::new(bus), stage.palette())?,
             stage,
             offscreen: &mut memory.offscreen,
             lines: Lines::new(),
@@ -158,7 +158,7 @@ impl<'a, B: Bus> Show<'a, B> {
             drawn: Stats::default(),
             most: 0,
             pace: Some(Pace::default()),
-        }
+        })
     }
 
     /// The card.
@@ -512,7 +512,9 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Sets the card anew: no picture is on it.
     fn reset(&mut self) {
         self.picture = None;
-        expect(self.card.reset(self.stage.palette()));
+        if let Err(error) = self.card.reset(self.stage.palette()) {
+            panic!("the card took Mode X before, and does not take it again: {error}");
+        }
     }
 
     fn header(&self, content: Content) -> Header<&'static str> {
@@ -663,13 +665,6 @@ fn name(pose: &Pose) -> Picture {
         pitch: pose.pitch,
         roll: pose.roll,
         distance: pose.distance.unsigned_abs(),
-    }
-}
-
-fn expect<T>(outcome: Result<T, Readback>) -> T {
-    match outcome {
-        Ok(card) => card,
-        Err(readback) => panic!("Mode X is not set: {readback}"),
     }
 }
 

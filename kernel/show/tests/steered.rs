@@ -49,7 +49,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
     println!("seed {seed}");
     let mut random = fastrand::Rng::with_seed(seed);
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let (mut tick, mut seen) = (random.u32(..1000), Vec::new());
     for picture in 0..80 {
         show.present(tick, &mut |_| {});
@@ -85,7 +85,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
     let log = done(&mut show, "log", tick);
     println!("{log:#?}");
     let mut memory = Box::new(Memory::new());
-    let mut twin = Show::new(&mut memory, Vga::new(), None);
+    let mut twin = Show::new(&mut memory, Vga::new(), None).unwrap();
     for (show, start) in [(&mut twin, "hold"), (&mut show, "hold")] {
         done(show, start, 0);
         for line in &log {
@@ -116,7 +116,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
 #[test]
 fn a_running_show_can_be_stopped_at_a_tick_of_its_own() {
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     show.present(10, &mut |_| {});
     done(&mut show, "steer nearer", 10);
     show.present(12, &mut |_| {});
@@ -147,7 +147,7 @@ fn a_running_show_can_be_stopped_at_a_tick_of_its_own() {
 #[test]
 fn what_cannot_be_steered_is_told() {
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let refused = |show: &mut Show<'_, Vga>, line, reason| {
         let answer = ask(show, line, 3);
         assert!(
@@ -179,7 +179,7 @@ fn what_cannot_be_steered_is_told() {
 #[test]
 fn a_full_log_is_told_and_steers_on() {
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     for tick in 0..1027 {
         done(&mut show, "steer next-order", tick);
     }
@@ -218,7 +218,7 @@ fn the_readme_has_every_key() {
 #[test]
 fn keys_are_listed_with_what_they_do() {
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let keys = done(&mut show, "keys", 0);
     assert_eq!(keys.len(), KEYS.len());
     assert!(
@@ -237,7 +237,7 @@ fn keys_are_listed_with_what_they_do() {
 #[test]
 fn an_overlay_is_counted_apart_and_goes_again() {
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let mut tick = 0;
     let mut present = |show: &mut Show<'_, Vga>| {
         tick += 1;
@@ -298,7 +298,7 @@ fn an_overlay_is_counted_apart_and_goes_again() {
 fn a_split_view_shows_the_same_part_three_times() {
     const LINES: usize = 200;
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let mut tick = 0;
     let mut pixels = |show: &mut Show<'_, Vga>| {
         tick += 1;
@@ -359,7 +359,7 @@ fn a_split_view_shows_the_same_part_three_times() {
 #[test]
 fn quality_is_lower_while_it_moves_and_only_then() {
     let mut memory = Box::new(Memory::new());
-    let mut show = Show::new(&mut memory, Vga::new(), None);
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let drawn = |evidence: &[String]| evidence.last().unwrap().clone();
     let present = |show: &mut Show<'_, Vga>, tick| {
         show.present(tick, &mut |_| {});

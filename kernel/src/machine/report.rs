@@ -1,9 +1,10 @@
-//! The last words: panics and CPU exceptions, whole, on the serial line.
+//! The last words: panics, CPU exceptions and an unfit display adapter, whole, on the serial line.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use link::{END_OF_REPORT, EXCEPTION, Exit, PANIC};
+use link::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, PANIC};
+use modex::SetError;
 
 use super::cpu::Frame;
 use super::serial::Unlocked;
@@ -19,6 +20,13 @@ pub fn panic(info: &PanicInfo<'_>) -> ! {
             None => out.line(format_args!("{PANIC}")),
         }
         out.line(format_args!("{}", info.message()));
+    })
+}
+
+/// Reports that the display adapter does not take Mode X and ends the machine.
+pub fn adapter(error: SetError) -> ! {
+    report(Exit::Adapter, |out| {
+        out.line(format_args!("{ADAPTER} does not take Mode X: {error}"));
     })
 }
 
