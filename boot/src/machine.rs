@@ -481,14 +481,25 @@ impl Machine {
             None if value.get("QMP").is_some() => {}
             None => self.answers.push_back(value),
             Some("SHUTDOWN") => {
+                // The first reason counts: `quit` below is followed by a reason of its own.
+                let first = self.seen.shutdown.is_none();
                 let reason = value["data"]["reason"].as_str().unwrap_or("unknown");
-                self.seen.shutdown = Some(reason.to_string());
-                // After a reset QEMU stands still; for the other reasons it leaves by itself.
-                if reason == "guest-reset" {
-                    return Err(self.judge());
+                let reason = self.seen.shutdown.get_or_insert(reason.to_string());
+                match reason.as_str() {
+                    // After a reset QEMU stands still.
+                    "guest-reset" => return Err(self.judge()),
+                    // `isa-debug-exit` ends QEMU 7.2 at once. QEMU 10 and later request a shutdown
+                    // in place of that, and `-no-shutdown` makes QEMU stand still. `quit` ends such
+                    // a QEMU with the exit code that the kernel wrote.
+                    "guest-shutdown" if first => {
+                        let _ = qmp::send(&mut self.control, "quit", json!({}));
+                    }
+                    // For the other reasons QEMU ends without a command.
+                    _ => {}
                 }
             }
-            Some("STOP") => self.seen.paused = true,
+            // After a shutdown the machine stands still because it is off: nobody paused it.
+            Some("STOP") => self.seen.paused = self.seen.shutdown.is_none(),
             Some("RESUME") => self.seen.paused = false,
             Some(_) => {}
         }
@@ -515,8 +526,8 @@ impl Machine {
             },
             (_, Some("guest-reset")) if seen.hello => Verdict::TripleFault { booted: false },
             (_, Some("guest-reset")) => Verdict::BootLoader { reset: true },
-            // SDL's window says host-ui when it is closed, GTK's quits as QMP would; this program
-            // itself never sends `quit`.
+            // SDL's window says host-ui when it is closed, GTK's quits as QMP would. This program
+            // sends `quit` only after a shutdown with another reason.
             (_, Some("host-ui" | "host-qmp-quit" | "host-signal")) => Verdict::User,
             _ => Verdict::Qemu {
                 words: std::mem::take(&mut seen.words),
