@@ -46,15 +46,33 @@ use crate::dump::Dump;
 use crate::screen::Screen;
 use crate::setup::Ready;
 
-/// From starting QEMU to the kernel's first line: more than ten times the 1.2 s that it takes
-/// alone, and eight times the 2.5 s that it takes from an IDE disk.
-const BOOT_LIMIT: Duration = Duration::from_secs(20);
-/// For an answer of the kernel or of QEMU: ten times the 1 s that all of video memory takes alone.
-const ANSWER_LIMIT: Duration = Duration::from_secs(10);
 /// How often a running show is asked for a sign of life.
 const HEARTBEAT: Duration = Duration::from_secs(5);
 /// How often waiting looks up, for Ctrl-C.
 const LOOK_UP: Duration = Duration::from_millis(50);
+
+/// How long a run may keep this program waiting.
+///
+/// A limit counts the processor time that QEMU uses; a QEMU that idles reaches it by the clock,
+/// and 15 times the limit by the clock is the end in any case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Limits {
+    /// From QEMU's start to the kernel's first line.
+    pub boot: Duration,
+    /// For each answer of the kernel and of QEMU, and for QEMU's end.
+    pub answer: Duration,
+}
+
+impl Default for Limits {
+    /// At least ten times what each takes on a quiet machine: 1.2 s for a boot (2.5 s from an IDE
+    /// disk), 1 s for a dump of all video memory.
+    fn default() -> Self {
+        Self {
+            boot: Duration::from_secs(20),
+            answer: Duration::from_secs(10),
+        }
+    }
+}
 
 /// What to boot, and how.
 #[derive(Clone, Debug)]
@@ -74,6 +92,8 @@ pub struct Config {
     pub arguments: Vec<OsString>,
     /// Where the evidence of a failure is kept, in a folder of its own each time.
     pub failures: PathBuf,
+    /// How long to wait for the machine.
+    pub limits: Limits,
 }
 
 impl Config {
@@ -87,6 +107,7 @@ impl Config {
             pack: None,
             arguments: Vec::new(),
             failures: ready.image.with_file_name("failures"),
+            limits: Limits::default(),
         }
     }
 }
@@ -101,6 +122,7 @@ pub struct Machine {
     /// The QEMU command line, the serial log, QEMU's words: kept on failure.
     folder: TempDir,
     failures: PathBuf,
+    limits: Limits,
     seen: Seen,
     lines: VecDeque<String>,
     answers: VecDeque<Value>,
@@ -164,8 +186,9 @@ impl Machine {
             child::line(&command) + "\n",
         )?;
         let process = start(command, send.clone())?;
-        let connected = accept(&control_socket, process, "its control socket")
-            .and_then(|control| Ok((control, accept(&serial_socket, process, "the serial line")?)));
+        let accept = |socket, name| accept(socket, process, config.limits.answer, name);
+        let connected = accept(&control_socket, "its control socket")
+            .and_then(|control| Ok((control, accept(&serial_socket, "the serial line")?)));
         let (control, serial) = match connected {
             Ok(streams) => streams,
             Err(error) => return Err(never_connected(error, process, &events, &folder, config)),
@@ -179,12 +202,13 @@ impl Machine {
             process,
             folder,
             failures: config.failures.clone(),
+            limits: config.limits,
             seen: Seen::default(),
             lines: VecDeque::new(),
             answers: VecDeque::new(),
         };
         machine.negotiate()?;
-        let mut patience = Patience::new(process, BOOT_LIMIT);
+        let mut patience = Patience::new(process, config.limits.boot);
         while !machine.seen.hello {
             if !machine.pump_or_wait(&mut patience)? {
                 return Err(machine.fail(Verdict::BootLoader { reset: false }));
@@ -198,7 +222,7 @@ impl Machine {
 
     /// Waits until the kernel has taken the pack of this checksum.
     fn wait_for_pack(&mut self, pack: u32) -> anyhow::Result<()> {
-        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
+        let mut patience = Patience::new(self.process, self.limits.answer);
         while self.seen.pack.is_none() {
             if !self.pump_or_wait(&mut patience)? {
                 return Err(self.fail(Verdict::Hang {
@@ -230,7 +254,7 @@ impl Machine {
     /// # Errors
     /// A [`Failure`].
     pub fn wait_until_running(&mut self) -> anyhow::Result<()> {
-        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
+        let mut patience = Patience::new(self.process, self.limits.answer);
         while self.lines.pop_front().is_none_or(|line| line != RUNNING) {
             if self.lines.is_empty() && !self.pump_or_wait(&mut patience)? {
                 return Err(self.fail(Verdict::Hang {
@@ -257,7 +281,7 @@ impl Machine {
     /// When the serial line is gone; what ended it is the better error, so that is looked for.
     pub fn send_raw(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         if let Err(error) = self.serial.write_all(bytes) {
-            self.pump(Instant::now() + ANSWER_LIMIT)?;
+            self.pump(Instant::now() + self.limits.answer)?;
             return Err(error).context("the serial line does not take what is sent");
         }
         Ok(())
@@ -280,7 +304,7 @@ impl Machine {
     /// # Errors
     /// A [`Failure`]; a hang if no answer comes in time.
     pub fn answer(&mut self, asked: &str) -> anyhow::Result<Vec<String>> {
-        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
+        let mut patience = Patience::new(self.process, self.limits.answer);
         let mut answer = Vec::new();
         loop {
             while let Some(line) = self.lines.pop_front() {
@@ -362,7 +386,7 @@ impl Machine {
     }
 
     fn run_to_the_end(&mut self) -> anyhow::Result<()> {
-        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
+        let mut patience = Patience::new(self.process, self.limits.answer);
         loop {
             match self.pump_or_wait(&mut patience) {
                 Ok(true) => {}
@@ -380,10 +404,10 @@ impl Machine {
     /// The host's words to QEMU: `execute` with `arguments`, and QEMU's answer.
     fn control(&mut self, execute: &str, arguments: Value) -> anyhow::Result<Value> {
         if let Err(error) = qmp::send(&mut self.control, execute, arguments) {
-            self.pump(Instant::now() + ANSWER_LIMIT)?;
+            self.pump(Instant::now() + self.limits.answer)?;
             return Err(error).context("QEMU's control socket is closed");
         }
-        let mut patience = Patience::new(self.process, ANSWER_LIMIT);
+        let mut patience = Patience::new(self.process, self.limits.answer);
         loop {
             if let Some(answer) = self.answers.pop_front() {
                 return Ok(answer);
@@ -554,7 +578,7 @@ impl Machine {
     fn keep_screen(&mut self) {
         let file = self.folder.path().join("screen.ppm");
         let sent = qmp::send(&mut self.control, "screendump", json!({ "filename": file }));
-        let by = Instant::now() + ANSWER_LIMIT;
+        let by = Instant::now() + self.limits.answer;
         while sent.is_ok()
             && let Ok(event) = self
                 .events
@@ -580,7 +604,7 @@ impl Machine {
         while self.seen.ended.is_none() {
             // QEMU, and all of it where --qemu names a script that starts one.
             let _ = kill_process_group(self.process, Signal::KILL);
-            match self.events.recv_timeout(ANSWER_LIMIT) {
+            match self.events.recv_timeout(self.limits.answer) {
                 Ok(event) => self.seen.note(event),
                 Err(_) => return,
             }
@@ -735,8 +759,13 @@ fn listen(path: &Path) -> anyhow::Result<UnixListener> {
 }
 
 /// Waits for QEMU to connect, or to end.
-fn accept(listener: &UnixListener, process: Pid, name: &str) -> anyhow::Result<UnixStream> {
-    let mut patience = Patience::new(process, ANSWER_LIMIT);
+fn accept(
+    listener: &UnixListener,
+    process: Pid,
+    limit: Duration,
+    name: &str,
+) -> anyhow::Result<UnixStream> {
+    let mut patience = Patience::new(process, limit);
     loop {
         match listener.accept() {
             Ok((stream, _)) => {
@@ -765,7 +794,7 @@ fn never_connected(
     let _ = kill_process_group(process, Signal::KILL);
     let mut seen = Seen::default();
     while seen.ended.is_none()
-        && let Ok(event) = events.recv_timeout(ANSWER_LIMIT)
+        && let Ok(event) = events.recv_timeout(config.limits.answer)
     {
         seen.note(event);
     }

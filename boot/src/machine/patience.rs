@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use rustix::process::Pid;
 
-/// Between looks at whether QEMU idles.
-const LOOK: Duration = Duration::from_secs(5);
+/// Looks at whether QEMU idles within a limit: each look is long enough to tell.
+const LOOKS: u32 = 2;
 /// Idle: less than this of one processor. A stopped machine was seen to use 1.3 % (its timers),
 /// one that boots beside a dozen busy processes on two cores some 15 %.
 const IDLE_PERCENT: u32 = 4;
@@ -52,7 +52,7 @@ impl Patience {
         let (now, used) = (Instant::now(), processor_time(self.process));
         let (since, before) = self.looked;
         let mut idle = false;
-        if now - since >= LOOK {
+        if now - since >= self.limit / LOOKS {
             idle = used.saturating_sub(before) * 100 < (now - since) * IDLE_PERCENT;
             self.looked = (now, used);
         }
