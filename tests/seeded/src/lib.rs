@@ -1,0 +1,103 @@
+//! Random tests: where the seed and the number of cases come from.
+//!
+//! A random test calls [`generator`] once and draws everything from it. Each run has a fresh seed. If
+//! the test fails, its output names the seed and the command that repeats the run.
+//!
+//! | variable | effect |
+//! | --- | --- |
+//! | `CRYSTAL_BALL_SEED` | every test takes this seed |
+//! | `CRYSTAL_BALL_CASES` | no test tries more cases than this, where its number of cases may vary ([`cases`]) |
+//!
+//! `cargo soak` repeats the random tests of the whole workspace.
+#![forbid(unsafe_code)]
+
+use std::env;
+use std::fmt::Write;
+
+use fastrand::Rng;
+
+/// The variable with the seed, a decimal number below 2^64.
+pub const SEED: &str = "CRYSTAL_BALL_SEED";
+/// The variable with the largest number of cases, a decimal number.
+pub const CASES: &str = "CRYSTAL_BALL_CASES";
+
+/// Returns the generator of a random test. Prints its seed, and the command that repeats the test with
+/// it: the test harness shows both if the test fails.
+///
+/// The generator's seed is [`Rng::get_seed`], until a number is drawn.
+///
+/// # Panics
+/// If [`SEED`] is set, and not to a number.
+pub fn generator() -> Rng {
+    let seed = number(SEED).unwrap_or_else(|| fastrand::u64(..));
+    println!("seed {seed}; to repeat this run:\n  {}", command(seed));
+    Rng::with_seed(seed)
+}
+
+/// Returns how many cases a random test tries: `usual`, or less if [`CASES`] says so, but 1 at least.
+///
+/// # Panics
+/// If [`CASES`] is set, and not to a number.
+pub fn cases(usual: u64) -> u64 {
+    limit(usual, number(CASES))
+}
+
+fn limit(usual: u64, most: Option<u64>) -> u64 {
+    most.map_or(usual, |most| usual.min(most.max(1)))
+}
+
+fn number(variable: &str) -> Option<u64> {
+    let value = env::var_os(variable)?;
+    let number = value.to_str().and_then(|text| text.parse().ok());
+    assert!(
+        number.is_some(),
+        "{variable}: '{}' is not a number; use 0 to {}",
+        value.display(),
+        u64::MAX
+    );
+    number
+}
+
+/// The command that repeats the test of this thread.
+fn command(seed: u64) -> String {
+    let mut command = format!("{SEED}={seed} ");
+    if let Some(cases) = number(CASES) {
+        let _ = write!(command, "{CASES}={cases} ");
+    }
+    match (env::var("CARGO_PKG_NAME"), env::current_exe()) {
+        (Ok(package), _) => {
+            let _ = write!(command, "cargo test -p {package}");
+        }
+        // Started by hand, without Cargo.
+        (Err(_), Ok(program)) => command += &program.display().to_string(),
+        (Err(_), Err(_)) => {}
+    }
+    // The harness names a test's thread after the test; with one thread there is no such name.
+    match std::thread::current().name() {
+        Some("main") | None => {}
+        Some(test) => {
+            let _ = write!(command, " {test}");
+        }
+    }
+    command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cases_are_limited_from_above_and_there_is_one_at_least() {
+        assert_eq!(limit(100, None), 100);
+        assert_eq!(limit(100, Some(20)), 20);
+        assert_eq!(limit(100, Some(1000)), 100);
+        assert_eq!(limit(100, Some(0)), 1);
+    }
+
+    #[test]
+    fn the_command_names_seed_package_and_test() {
+        let command = command(7);
+        assert!(command.contains("CRYSTAL_BALL_SEED=7 "), "{command}");
+        assert!(command.contains("seeded"), "{command}");
+    }
+}
