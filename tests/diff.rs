@@ -79,8 +79,9 @@ fn dump(content: Content) -> Dump {
             content,
             scene: "ball".into(),
             pack: None,
-            mapper: Word::new("exact").unwrap(),
+            mapper: Word::new("exact"),
             picture: Some(Picture::Frame(480)),
+            motion: None,
             start: 0x4B00,
             width: 320,
             height: 240,
@@ -290,10 +291,10 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         ),
         (
             "later",
-            good.replacen(lines[0], &framed("crystal-ball dump 4"), 1)
+            good.replacen(lines[0], &framed("crystal-ball dump 5"), 1)
                 .into(),
             [
-                "line 1: it is a dump of version 4; this program reads version 3",
+                "line 1: it is a dump of version 5; this program reads versions 3 to 4",
                 "take the dump again",
             ],
         ),
@@ -310,7 +311,7 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         (
             "edited",
             good.replacen("line 007 e8", "line 007 e9", 1).into(),
-            ["line 32: ", "take the dump again"],
+            ["line 33: ", "take the dump again"],
         ),
         (
             "cut.png",

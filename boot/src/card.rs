@@ -9,7 +9,7 @@
 use anyhow::{Context, anyhow, bail};
 use emulator::Vga;
 use link::dump::{Header, PLANE_BYTES};
-use link::{Command, Content, ERROR, OK, Picture, Word};
+use link::{Command, Content, ERROR, Motion, OK, Picture, Word};
 use pack::Pack;
 use scene::catalogue::Entry;
 use show::{Memory, Show};
@@ -140,7 +140,16 @@ impl Card for Emulated<'_> {
             let said = lines.find_map(|line| line.strip_prefix(what)?.strip_prefix(' '));
             said.with_context(|| format!("the state has no line '{what}'"))
         };
+        let words = |what| Ok::<_, anyhow::Error>(Some(said(what)?).filter(|said| *said != "none"));
         let scene = said("scene")?;
+        let mapper =
+            words("drawn")?.map(|name| Word::new(name).context("a mapper's name is a word"));
+        let picture = words("picture")?.map(|name| {
+            Picture::parse(name.split(' ')).with_context(|| format!("'{name}' is no picture"))
+        });
+        let motion = words("motion")?.map(|parts| {
+            Motion::parse(parts.split(' ')).with_context(|| format!("'{parts}' is no motion"))
+        });
         let vga = self.show.bus();
         let page = vga.page().map_err(|fault| anyhow!("{fault}"))?;
         let pixels = match content {
@@ -154,8 +163,9 @@ impl Card for Emulated<'_> {
                 content,
                 scene: scene.into(),
                 pack: self.pack.filter(|_| scene == Entry::LOADED),
-                mapper: Word::new(said("drawn")?).context("a mapper's name is a word")?,
-                picture: Picture::parse(said("picture")?.split(' ')),
+                mapper: mapper.transpose()?,
+                picture: picture.transpose()?,
+                motion: motion.transpose()?,
                 start: page.start,
                 width: page.width.try_into()?,
                 height: page.height.try_into()?,

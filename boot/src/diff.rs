@@ -14,7 +14,7 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 use link::Content;
-use link::dump::{MAGIC, PLANE_BYTES};
+use link::dump::{MAGIC, OrNone, PLANE_BYTES};
 use modex::Rgb6;
 
 use crate::child;
@@ -330,15 +330,24 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
         );
     }
     let pack = |pack: Option<u32>| pack.map_or("none".into(), |pack| format!("{pack:08x}"));
-    let picture = |picture: Option<link::Picture>| match picture {
-        Some(picture) => picture.to_string(),
-        None => "none".into(),
-    };
     let fields = [
         ("scene", a.scene.clone(), b.scene.clone()),
         ("pack", pack(a.pack), pack(b.pack)),
-        ("mapper", a.mapper.to_string(), b.mapper.to_string()),
-        ("picture", picture(a.picture), picture(b.picture)),
+        (
+            "mapper",
+            OrNone(&a.mapper).to_string(),
+            OrNone(&b.mapper).to_string(),
+        ),
+        (
+            "picture",
+            OrNone(&a.picture).to_string(),
+            OrNone(&b.picture).to_string(),
+        ),
+        (
+            "motion",
+            OrNone(&a.motion).to_string(),
+            OrNone(&b.motion).to_string(),
+        ),
         (
             "start",
             format!("{:04x}", a.start),
@@ -791,8 +800,9 @@ mod tests {
                 content,
                 scene: "ball".into(),
                 pack: None,
-                mapper: Word::new("exact").unwrap(),
+                mapper: Word::new("exact"),
                 picture: Some(Picture::Frame(480)),
+                motion: None,
                 start: 0x4B00,
                 width: 320,
                 height: 240,

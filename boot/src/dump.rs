@@ -8,7 +8,7 @@ use std::fmt;
 use std::io::{self, Write};
 
 use link::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
-use link::{Content, Lines, Picture, Word};
+use link::{Content, Lines, Motion, Picture, Word};
 use modex::Palette;
 
 use crate::indexed::Indexed;
@@ -184,6 +184,9 @@ impl Dump {
     }
 }
 
+/// The oldest version of the format that can be read.
+const OLDEST: u32 = 3;
+
 fn no_dump(why: &str) -> String {
     format!("it is no dump: it does not begin with '{MAGIC} {VERSION}' ({why})")
 }
@@ -219,12 +222,16 @@ impl<'a> Reader<'a> {
 
     fn dump(&mut self) -> Result<Dump, String> {
         let version = self.line(MAGIC).map_err(|why| no_dump(&why))?;
-        if version != VERSION.to_string() {
-            return Err(format!(
-                "it is a dump of version {version}; this program reads version {VERSION}"
-            ));
-        }
-        let header = self.header()?;
+        let version = match version.parse() {
+            Ok(version @ OLDEST..=VERSION) => version,
+            _ => {
+                return Err(format!(
+                    "it is a dump of version {version}; this program reads versions {OLDEST} to \
+                     {VERSION}"
+                ));
+            }
+        };
+        let header = self.header(version)?;
         let palette = self.palette()?;
         let mut pixels = Vec::with_capacity(4 * PLANE_BYTES);
         for row in header.rows() {
@@ -254,7 +261,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    fn header(&mut self) -> Result<Header<String>, String> {
+    fn header(&mut self, version: u32) -> Result<Header<String>, String> {
         let content = match self.line("content")? {
             "page" => Content::Page,
             "memory" => Content::Memory,
@@ -272,14 +279,28 @@ impl<'a> Reader<'a> {
                 Some(u32::from_be_bytes(checksum))
             }
         };
-        let mapper = self.line("mapper")?;
-        let mapper = Word::new(mapper).ok_or_else(|| format!("'{mapper}' is no mapper's name"))?;
+        let mapper = match self.line("mapper")? {
+            "none" => None,
+            name => Some(Word::new(name).ok_or_else(|| format!("'{name}' is no mapper's name"))?),
+        };
         let picture = match self.line("picture")? {
             "none" => None,
             name => Some(
                 Picture::parse(name.split(' ')).ok_or_else(|| format!("'{name}' is no picture"))?,
             ),
         };
+        // Version 3 named a mapper without a picture, and did not know the motion.
+        let mapper = mapper.filter(|_| picture.is_some());
+        let motion =
+            match version {
+                ..4 => None,
+                _ => match self.line("motion")? {
+                    "none" => None,
+                    parts => Some(Motion::parse(parts.split(' ')).ok_or_else(|| {
+                        format!("'{parts}' is no motion: it has four hex numbers")
+                    })?),
+                },
+            };
         let mut start = Vec::new();
         hex(self.line("start")?, &mut start)?;
         let start: [u8; 2] = start
@@ -305,6 +326,7 @@ impl<'a> Reader<'a> {
             pack,
             mapper,
             picture,
+            motion,
             start: u16::from_be_bytes(start),
             width,
             height,
@@ -354,4 +376,99 @@ fn hex(digits: &str, bytes: &mut Vec<u8>) -> Result<(), String> {
         })?);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dump() -> Dump {
+        Dump {
+            header: Header {
+                content: Content::Page,
+                scene: "cube".into(),
+                pack: None,
+                mapper: Word::new("exact"),
+                picture: Some(Picture::Frame(7)),
+                motion: Some(Motion {
+                    yaw: 1,
+                    pitch: u32::MAX,
+                    roll: 0,
+                    distance: 0xFFFF_0000,
+                }),
+                start: 0,
+                width: 320,
+                height: 240,
+            },
+            palette: [[1, 2, 3]; 256],
+            pixels: vec![7; 320 * 240],
+        }
+    }
+
+    /// The lines with another end, as it belongs to them.
+    fn ended(mut lines: Vec<String>) -> Vec<String> {
+        lines.pop();
+        let mut whole = Whole::default();
+        for line in &lines {
+            whole.add(format_args!("{line}"));
+        }
+        lines.push(whole.to_string());
+        lines
+    }
+
+    #[test]
+    fn a_header_comes_back_with_its_motion_and_without_a_picture() {
+        let mut dump = dump();
+        assert_eq!(
+            dump.lines()[4..7],
+            [
+                "mapper exact",
+                "picture 7",
+                "motion 00000001 ffffffff 00000000 ffff0000"
+            ]
+        );
+        assert_eq!(Dump::from_lines(&dump.lines()).unwrap(), dump);
+        let header = &mut dump.header;
+        (header.mapper, header.picture, header.motion) = (None, None, None);
+        assert_eq!(
+            dump.lines()[4..7],
+            ["mapper none", "picture none", "motion none"]
+        );
+        assert_eq!(Dump::from_lines(&dump.lines()).unwrap(), dump);
+    }
+
+    #[test]
+    fn version_3_is_read_as_a_dump_without_motion() {
+        let mut old = dump();
+        old.header.motion = None;
+        let mut lines = old.lines();
+        lines[0] = format!("{MAGIC} 3");
+        assert_eq!(lines.remove(6), "motion none");
+        assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), old);
+        // It named a mapper before the first picture, too.
+        lines[5] = "picture none".into();
+        let header = Dump::from_lines(&ended(lines.clone())).unwrap().header;
+        assert_eq!((header.mapper, header.picture), (None, None));
+        lines[0] = format!("{MAGIC} 4");
+        let error = Dump::from_lines(&ended(lines)).unwrap_err();
+        assert_eq!(error.line, 7);
+        assert!(error.why.contains("'motion' should"), "{error}");
+    }
+
+    #[test]
+    fn other_versions_and_motions_are_refused_by_line() {
+        for (at, line, why) in [
+            (0, "crystal-ball dump 2", "reads versions 3 to 4"),
+            (0, "crystal-ball dump 5", "reads versions 3 to 4"),
+            (0, "crystal-ball dump four", "version four"),
+            (6, "motion 1 2 3", "it has four hex numbers"),
+            (6, "motion 1 2 3 -4", "it has four hex numbers"),
+        ] {
+            let mut lines = dump().lines();
+            lines[at] = line.into();
+            let error = Dump::from_lines(&ended(lines)).unwrap_err();
+            assert_eq!(error.line, at + 1, "{error}");
+            assert!(error.why.contains(why), "{line}: {error}");
+        }
+    }
 }

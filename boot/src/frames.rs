@@ -7,8 +7,8 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context;
-use clap::Args;
-use link::{Content, Picture};
+use clap::{ArgAction, Args};
+use link::{Command, Content, Motion, Picture};
 
 use crate::card::Card;
 use crate::look::Look;
@@ -20,6 +20,11 @@ use crate::{aside, child};
 pub struct Frames {
     #[command(flatten)]
     which: Which,
+    /// Draw in reduced quality, as a solid that moves by so much a tick: the changes of the angles
+    /// and of the distance, each in hex and modulo 2^32, as a dump's line `motion` has them
+    #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
+        value_parser = hex, action = ArgAction::Set)]
+    motion: Option<Vec<u32>>,
     /// All of video memory, 4 x 64 KiB, and not only the page on the screen
     #[arg(long)]
     all: bool,
@@ -97,6 +102,19 @@ impl Frames {
         (count, pictures)
     }
 
+    /// The motion, if there is one.
+    fn motion(&self) -> Option<Motion> {
+        let &[yaw, pitch, roll, distance] = self.motion.as_deref()? else {
+            return None;
+        };
+        Some(Motion {
+            yaw,
+            pitch,
+            roll,
+            distance,
+        })
+    }
+
     /// Has each picture shown by `card`, drawn as `look` says, and writes its dump and its PNG; `wrote` is told the path
     /// of each.
     ///
@@ -114,6 +132,7 @@ impl Frames {
             true => Content::Memory,
             false => Content::Page,
         };
+        let motion = self.motion();
         let (count, pictures) = self.pictures();
         let what = format_args!("dumping into {}", self.out.display());
         let mut step = Step::counting(what, count);
@@ -121,9 +140,13 @@ impl Frames {
             if child::interrupted() {
                 return Err(child::Interrupted.into());
             }
-            card.show_as(look, &[picture])?;
+            card.show_as(look, &[])?;
+            card.ask(match motion {
+                Some(motion) => Command::ShowMoving(picture, motion),
+                None => Command::Show(picture),
+            })?;
             let dump = card.dump(content)?;
-            let stem = self.out.join(stem(picture, content));
+            let stem = self.out.join(stem(picture, motion, content));
             let text = stem.with_added_extension("dump");
             aside::write(&text, |file| Ok(dump.write(std::io::BufWriter::new(file))?))?;
             let png = stem.with_added_extension("png");
@@ -137,8 +160,8 @@ impl Frames {
 }
 
 /// The name of a picture's files: numbers padded, so that a folder sorts by frame.
-fn stem(picture: Picture, content: Content) -> String {
-    let name = match picture {
+fn stem(picture: Picture, motion: Option<Motion>, content: Content) -> String {
+    let mut name = match picture {
         Picture::Frame(frame) => format!("frame-{frame:06}"),
         Picture::Pose {
             yaw,
@@ -147,6 +170,9 @@ fn stem(picture: Picture, content: Content) -> String {
             distance,
         } => format!("pose-{yaw:08x}-{pitch:08x}-{roll:08x}-{distance:08x}"),
     };
+    if let Some(motion) = motion {
+        name += &format!(" motion {motion}").replace(' ', "-");
+    }
     match content {
         Content::Page => name,
         Content::Memory => name + "-all",

@@ -89,7 +89,9 @@ const EMULATE_HELP: &str = "\
 Examples:
   cargo run -- emulate --frames 0..10 --out b                  what `dump` would write
   cargo run -- emulate --frame 0 --frame 480 --mapper affine   two pictures, into dumps/
-  cargo run -- emulate --pose 40000000 0 0 50000 --scene cube  in a pose of one's own";
+  cargo run -- emulate --pose 40000000 0 0 50000 --scene cube  in a pose of one's own
+  cargo run -- emulate --frame 8 --mapper exact --motion ffa4fa50 0 0 0
+                                                               in reduced quality";
 
 const RECORD_HELP: &str = "\
 Examples:

@@ -16,6 +16,9 @@ pub enum Command {
     /// `show PICTURE`: draw it on the next page, flip, and answer when the flip holds. A show
     /// that runs is stopped first, its settings as they are.
     Show(Picture),
+    /// `show PICTURE motion MOTION`: the same in reduced quality, as a solid that moves by so much a
+    /// tick is drawn.
+    ShowMoving(Picture, Motion),
     /// `show at TICK`: the same with the picture that the show has, or had, at a tick: that of its
     /// log. Scene, mapper and order are then those of that tick.
     ShowAt(u32),
@@ -70,24 +73,63 @@ impl Picture {
     /// Reads a name, as [`fmt::Display`] writes it.
     pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
         let picture = match words.next()? {
-            "pose" => {
-                let mut hex = || {
-                    let word = words.next().filter(|word| word.len() <= 8)?;
-                    // `from_str_radix` would take a sign.
-                    let digits = word.bytes().all(|b| b.is_ascii_hexdigit());
-                    u32::from_str_radix(word, 16).ok().filter(|_| digits)
-                };
-                Self::Pose {
-                    yaw: hex()?,
-                    pitch: hex()?,
-                    roll: hex()?,
-                    distance: hex()?,
-                }
-            }
+            "pose" => Self::Pose {
+                yaw: hex(words.next()?)?,
+                pitch: hex(words.next()?)?,
+                roll: hex(words.next()?)?,
+                distance: hex(words.next()?)?,
+            },
             number => Self::Frame(decimal(number)?),
         };
         words.next().is_none().then_some(picture)
     }
+}
+
+/// How much a pose changes in a tick. Each part is added to the pose's part modulo 2^32, so that a
+/// part that falls is a two's complement.
+///
+/// In reduced quality the motion decides which faces are drawn by a faster mapper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Motion {
+    /// Change of [`Picture::Pose::yaw`], a 32-bit fraction of a turn.
+    pub yaw: u32,
+    /// Change of [`Picture::Pose::pitch`].
+    pub pitch: u32,
+    /// Change of [`Picture::Pose::roll`].
+    pub roll: u32,
+    /// Change of [`Picture::Pose::distance`], in 16.16.
+    pub distance: u32,
+}
+
+impl Motion {
+    /// Reads a motion, as [`fmt::Display`] writes it: four words of up to eight hex digits.
+    pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
+        let motion = Self {
+            yaw: hex(words.next()?)?,
+            pitch: hex(words.next()?)?,
+            roll: hex(words.next()?)?,
+            distance: hex(words.next()?)?,
+        };
+        words.next().is_none().then_some(motion)
+    }
+}
+
+impl fmt::Display for Motion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            yaw,
+            pitch,
+            roll,
+            distance,
+        } = self;
+        write!(f, "{yaw:08x} {pitch:08x} {roll:08x} {distance:08x}")
+    }
+}
+
+/// A number of one to eight hex digits: `from_str_radix` would accept a sign and leading zeros.
+fn hex(word: &str) -> Option<u32> {
+    let digits = word.len() <= 8 && word.bytes().all(|b| b.is_ascii_hexdigit());
+    u32::from_str_radix(word, 16).ok().filter(|_| digits)
 }
 
 /// A number of digits alone: `parse` would take a sign.
@@ -258,7 +300,7 @@ impl fmt::Display for CommandError<'_> {
         match self {
             Self::Unknown(word) => write!(
                 f,
-                "no command '{word}'; there are hold, run, show PICTURE, show at TICK, scene NAME, \
+                "no command '{word}'; there are hold, run, show PICTURE, show PICTURE motion MOTION, show at TICK, scene NAME, \
                  mapper NAME, order NAME, steer CHANGE, steer TICK CHANGE, log, keys, dump, checksums, \
                  registers, counts, state, version, fail KIND, leave"
             ),
@@ -290,11 +332,19 @@ impl Command {
                     let tick = words.next().and_then(decimal);
                     tick.filter(|_| words.next().is_none()).map(Self::ShowAt)
                 }
-                false => Picture::parse(words).map(Self::Show),
+                false => {
+                    let mut motion = words.clone().skip_while(|word| *word != "motion");
+                    let picture = Picture::parse(words.take_while(|word| *word != "motion"));
+                    picture.and_then(|picture| match motion.next() {
+                        Some(_) => Some(Self::ShowMoving(picture, Motion::parse(motion)?)),
+                        None => Some(Self::Show(picture)),
+                    })
+                }
             };
             return shown.ok_or(takes(
                 "a frame number, 0 to 4294967295, or 'pose' and four hex numbers: \
-                 yaw, pitch, roll, distance, or 'at' and a tick",
+                 yaw, pitch, roll, distance, either of them alone or followed by 'motion' and four \
+                 hex numbers: what each changes by in a tick; or 'at' and a tick",
             ));
         }
         if command == "steer" {
@@ -356,6 +406,7 @@ impl fmt::Display for Command {
             Self::Hold => f.write_str("hold"),
             Self::Run => f.write_str("run"),
             Self::Show(picture) => write!(f, "show {picture}"),
+            Self::ShowMoving(picture, motion) => write!(f, "show {picture} motion {motion}"),
             Self::ShowAt(tick) => write!(f, "show at {tick}"),
             Self::Steer(None, change) => write!(f, "steer {change}"),
             Self::Steer(Some(tick), change) => write!(f, "steer {tick} {change}"),
@@ -388,6 +439,13 @@ mod tests {
     use std::string::ToString;
     use std::vec::Vec;
 
+    const MOTION: Motion = Motion {
+        yaw: 5,
+        pitch: u32::MAX,
+        roll: 0,
+        distance: 0xFFFF_0000,
+    };
+
     #[test]
     fn every_command_comes_back() {
         let mut commands = std::vec![
@@ -401,6 +459,16 @@ mod tests {
                 roll: 0x0123_abcd,
                 distance: 1,
             }),
+            Command::ShowMoving(Picture::Frame(7), MOTION),
+            Command::ShowMoving(
+                Picture::Pose {
+                    yaw: 1,
+                    pitch: 2,
+                    roll: 3,
+                    distance: 4,
+                },
+                MOTION,
+            ),
             Command::ShowAt(0),
             Command::ShowAt(u32::MAX),
             Command::Set(Setting::Mapper, None),
@@ -456,6 +524,16 @@ mod tests {
             ("show pose 1 2 3 4 5", "four hex numbers"),
             ("show pose +1 2 3 4", "four hex numbers"),
             ("show pose 1 2 3 123456789", "four hex numbers"),
+            ("show motion 1 2 3 4", "a frame number"),
+            ("show 1 motion", "'motion' and four hex numbers"),
+            ("show 1 motion 1 2 3", "'motion' and four hex numbers"),
+            ("show 1 motion 1 2 3 4 5", "'motion' and four hex numbers"),
+            ("show 1 motion 1 2 3 -4", "'motion' and four hex numbers"),
+            (
+                "show 1 motion 1 2 3 123456789",
+                "'motion' and four hex numbers",
+            ),
+            ("show at 1 motion 1 2 3 4", "'at' and a tick"),
             ("show at", "'at' and a tick"),
             ("show at -1", "'at' and a tick"),
             ("show at 1 2", "'at' and a tick"),

@@ -1,17 +1,18 @@
 //! Dumps: what a card holds, as text that `diff` can compare.
 //!
 //! ```text
-//! crystal-ball dump 3
+//! crystal-ball dump 4
 //! content page
 //! scene ball
 //! pack none
 //! mapper shifts
 //! picture 480
+//! motion none
 //! start 4b00
 //! size 320 240
 //! palette 00 000000 2a1c0f ...     16 lines of 16 colours, 6 bits a part: 00 to 3f
 //! line 000 6b6b6b6b ...            a line for each scan line, two hex digits a pixel
-//! end 263 lines 5d41402a
+//! end 264 lines 5d41402a
 //! ```
 //!
 //! Each of them is a line of the protocol, so it ends in its own checksum. The last one counts the
@@ -26,14 +27,19 @@
 //! the model came with, eight hex digits. Dumps of different packs are of different models, though
 //! their scenes have one name.
 //!
+//! The header names the picture so that `scene`, `mapper` and `show` draw it again. If some of its faces
+//! were drawn in reduced quality, `motion` is the [`Motion`] that decided which; otherwise it is `none`.
+//! Before the first picture `mapper`, `picture` and `motion` are `none`. Version 3 had no line `motion`
+//! and marked reduced quality by a `~` behind the mapper's name.
+//!
 //! Two dumps of the same picture on different pages differ in their `start` alone.
 
 use core::fmt;
 
-use crate::{Checksum, Content, Picture, Word};
+use crate::{Checksum, Content, Motion, Picture, Word};
 
 /// Version of the format, in a dump's first line.
-pub const VERSION: u32 = 3;
+pub const VERSION: u32 = 4;
 /// How a dump's first line begins; the version follows.
 pub const MAGIC: &str = "crystal-ball dump";
 /// Addresses of each plane.
@@ -52,10 +58,13 @@ pub struct Header<S> {
     pub scene: S,
     /// The checksum of the pack that the scene came with; none for a built-in one.
     pub pack: Option<u32>,
-    /// The name of the mapper that drew it.
-    pub mapper: Word,
+    /// The name of the mapper that drew it; nothing before the first picture.
+    pub mapper: Option<Word>,
     /// What is on the screen; nothing before the first picture.
     pub picture: Option<Picture>,
+    /// The motion that decided which of its faces are drawn in reduced quality; nothing if all are
+    /// drawn in full quality.
+    pub motion: Option<Motion>,
     /// The start address: where the page on the screen begins in each plane.
     pub start: u16,
     /// Pixels in a line, a multiple of 4, at most [`MAX_WIDTH`].
@@ -173,6 +182,7 @@ pub fn write<S: fmt::Display>(
         pack,
         mapper,
         picture,
+        motion,
         start,
         width,
         height,
@@ -184,11 +194,9 @@ pub fn write<S: fmt::Display>(
         Some(pack) => put(format_args!("pack {pack:08x}")),
         None => put(format_args!("pack none")),
     }
-    put(format_args!("mapper {mapper}"));
-    match picture {
-        Some(picture) => put(format_args!("picture {picture}")),
-        None => put(format_args!("picture none")),
-    }
+    put(format_args!("mapper {}", OrNone(mapper)));
+    put(format_args!("picture {}", OrNone(picture)));
+    put(format_args!("motion {}", OrNone(motion)));
     put(format_args!("start {start:04x}"));
     put(format_args!("size {width} {height}"));
     for (i, colours) in palette.chunks(COLOURS_A_LINE).enumerate() {
@@ -202,6 +210,19 @@ pub fn write<S: fmt::Display>(
         put(format_args!("{row} {}", Hex(pixels)));
     }
     line(format_args!("{whole}"));
+}
+
+/// Displays a value, or `none` in place of a value that is missing.
+#[derive(Clone, Copy, Debug)]
+pub struct OrNone<'a, T>(pub &'a Option<T>);
+
+impl<T: fmt::Display> fmt::Display for OrNone<'_, T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            Some(value) => value.fmt(f),
+            None => f.write_str("none"),
+        }
+    }
 }
 
 impl fmt::Display for Content {
@@ -306,8 +327,9 @@ mod tests {
             content,
             scene: "ball",
             pack: None,
-            mapper: Word::new("exact").unwrap(),
+            mapper: Word::new("exact"),
             picture: Some(Picture::Frame(u32::MAX)),
+            motion: None,
             start: 0x4B00,
             width: 320,
             height: 240,
@@ -332,12 +354,15 @@ mod tests {
             (Content::Memory, 820, "memory fff0 "),
         ] {
             let lines = lines(content);
-            assert_eq!(lines.len(), 8 + 16 + rows + 1);
-            assert_eq!(lines[0], "crystal-ball dump 3");
-            assert_eq!(lines[5], "picture 4294967295");
-            assert!(lines[23].starts_with("palette f0 3f0001 3f0001"));
-            assert!(lines[rows + 23].starts_with(last), "{}", lines[rows + 23]);
-            assert!(lines[rows + 24].starts_with(&std::format!("end {} lines ", rows + 24)));
+            assert_eq!(lines.len(), 9 + 16 + rows + 1);
+            assert_eq!(lines[0], "crystal-ball dump 4");
+            assert_eq!(
+                lines[4..7],
+                ["mapper exact", "picture 4294967295", "motion none"]
+            );
+            assert!(lines[24].starts_with("palette f0 3f0001 3f0001"));
+            assert!(lines[rows + 24].starts_with(last), "{}", lines[rows + 24]);
+            assert!(lines[rows + 25].starts_with(&std::format!("end {} lines ", rows + 25)));
             for line in &lines {
                 let mut sent = Vec::new();
                 crate::write_line(format_args!("{line}"), |bytes| {

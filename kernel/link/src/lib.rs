@@ -21,6 +21,7 @@
 //! | `hold` | |
 //! | `run` | |
 //! | `show 480`, `show pose 0 13e93e93 0ccccccc 2f333` | `page 1` |
+//! | `show 480 motion ffa4fa50 0 0 0` | the same; the picture is drawn in reduced quality |
 //! | `show at 99` | the same |
 //! | `scene cube`, `mapper exact`, `order planes` | |
 //! | `scene`, `mapper`, `order` | a line for each that there is: `exact perspective; ...`, the one that is set begins with `*` |
@@ -31,15 +32,15 @@
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
 //! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
-//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `drawn shifts` (`exact~` if faces that move were drawn in lower quality), `page 1 start 4b00` |
-//! | `version` | `crystal-ball 0.1.0 protocol 5 dump 3` |
+//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `motion none` (a motion if it had faces drawn in reduced quality), `drawn shifts` (the picture's mapper; `none` without a picture), `page 1 start 4b00` |
+//! | `version` | `crystal-ball 0.1.0 protocol 6 dump 4` |
 //! | `fail KIND` | none: the kernel breaks in the way that is named ([`Fault`]) |
 //! | `leave` | after the `ok` QEMU ends |
 //!
 //! Commands that come while an answer is under way are answered after it, in their order. A host
 //! that does not read is waited for. Between answers the kernel says on its own:
 //!
-//! - `hello crystal-ball VERSION protocol 5`: the boot loader has handed over;
+//! - `hello crystal-ball VERSION protocol 6`: the boot loader has handed over;
 //! - `loaded pack 1a2b3c4d`, with the pack's checksum, or `refused pack: ...`, and why: if the
 //!   boot loader brought a ramdisk, right after it;
 //! - `running`: the first picture is on the screen;
@@ -55,12 +56,12 @@ mod frame;
 mod lines;
 
 pub use action::{Action, Change};
-pub use command::{Command, CommandError, Content, Fault, Picture, Setting, Word};
+pub use command::{Command, CommandError, Content, Fault, Motion, Picture, Setting, Word};
 pub use frame::{Checksum, FrameError, unframe, write_line};
 pub use lines::{Lines, Noise};
 
 /// The protocol's version, in the kernel's first line.
-pub const PROTOCOL: u32 = 5;
+pub const PROTOCOL: u32 = 6;
 /// Longest line in bytes, its checksum included, its end not: 320 pixels of a dump with their
 /// label take 657.
 pub const MAX_LINE: usize = 700;

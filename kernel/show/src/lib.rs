@@ -20,10 +20,10 @@ mod steering;
 
 use core::fmt;
 
-use link::dump::{self, Header};
+use link::dump::{self, Header, OrNone};
 use link::{
-    Action, Change, Command, Content, ERROR, Fault, Lines, OK, PROTOCOL, Picture, RUNNING, Setting,
-    Word,
+    Action, Change, Command, Content, ERROR, Fault, Lines, Motion, OK, PROTOCOL, Picture, RUNNING,
+    Setting, Word,
 };
 use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, SetError, Tally, WIDTH};
 use pack::{Arena, Pack};
@@ -41,8 +41,7 @@ use steering::{Log, NotNoted, Notes, Scenes, State};
 /// The program's version, as its first line and `version` tell it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What a mapper's name ends in where so many faces were drawn in lower quality, since they moved. Such
-/// a picture is named by its log and tick: its pose does not tell which faces.
+/// What the overlay puts behind a mapper's name if so many faces were drawn in reduced quality.
 fn lower_mark(lowered: u32) -> &'static str {
     if lowered > 0 { "~" } else { "" }
 }
@@ -90,6 +89,15 @@ pub enum Request {
     Leave,
 }
 
+/// The picture on the screen: all that a dump's header needs to draw it again, but for the scene.
+#[derive(Clone, Copy, Debug)]
+struct Shown {
+    picture: Picture,
+    /// The motion that decided which faces are drawn in reduced quality, if there are such faces.
+    motion: Option<Motion>,
+    mapper: Mapper,
+}
+
 /// How the running show keeps up with the ticks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pace {
@@ -119,9 +127,9 @@ pub struct Show<'a, B> {
     stage: Stage<'a>,
     offscreen: &'a mut Offscreen,
     lines: Lines,
-    /// The last picture, by which mapper it was drawn, and what it took.
-    picture: Option<Picture>,
-    drawn_by: Option<Word>,
+    /// The picture on the screen; nothing after a reset of the card.
+    shown: Option<Shown>,
+    /// What drawing the last picture took.
     drawn: Stats,
     /// The largest error of the last picture, if it was split.
     most: u32,
@@ -153,8 +161,7 @@ impl<'a, B: Bus> Show<'a, B> {
             stage,
             offscreen: &mut memory.offscreen,
             lines: Lines::new(),
-            picture: None,
-            drawn_by: Word::of(Mapper::default()),
+            shown: None,
             drawn: Stats::default(),
             most: 0,
             pace: Some(Pace::default()),
@@ -229,8 +236,8 @@ impl<'a, B: Bus> Show<'a, B> {
                 let scenes = self.state.scenes;
                 let state = State::of(scenes, scenes.default());
                 self.log.restart(state);
-                self.adopt(state);
-                self.hold();
+                let _ = (self.adopt(state), self.hold());
+                self.reset();
             }
             Command::Run => {
                 if self.pace.is_none() {
@@ -239,19 +246,8 @@ impl<'a, B: Bus> Show<'a, B> {
                 }
                 self.pace = Some(Pace::default());
             }
-            Command::Show(picture) => {
-                let Some(pose) = pose(&self.state.entry, picture) else {
-                    let most = Pose::MAX_DISTANCE;
-                    out(format_args!("{ERROR} a distance is 0 to {most:08x}"));
-                    return None;
-                };
-                if self.pace.is_some() {
-                    self.hold();
-                }
-                self.stage.lower_for(None);
-                self.draw(picture, &pose, false);
-                self.tell_page(out);
-            }
+            Command::Show(picture) => self.show(picture, None, out)?,
+            Command::ShowMoving(picture, motion) => self.show(picture, Some(motion), out)?,
             Command::ShowAt(tick) => {
                 let Some(state) = self.log.state(tick) else {
                     out(format_args!(
@@ -259,10 +255,10 @@ impl<'a, B: Bus> Show<'a, B> {
                     ));
                     return None;
                 };
-                if self.pace.is_some() {
-                    self.hold();
+                let (ran, put) = (self.hold(), self.adopt(state));
+                if ran || put {
+                    self.reset();
                 }
-                self.adopt(state);
                 self.draw_at(tick);
                 self.tell_page(out);
             }
@@ -307,12 +303,43 @@ impl<'a, B: Bus> Show<'a, B> {
         (command == Command::Leave).then_some(Request::Leave)
     }
 
-    /// Draws a picture on the next page, and flips.
-    fn draw(&mut self, picture: Picture, pose: &Pose, overlay: bool) {
+    /// Carries `show` out; nothing if that was refused, and told.
+    fn show(&mut self, picture: Picture, motion: Option<Motion>, out: &mut Out<'_>) -> Option<()> {
+        let most = Pose::MAX_DISTANCE;
+        let Some(pose) = pose(&self.state.entry, picture) else {
+            out(format_args!("{ERROR} a distance is 0 to {most:08x}"));
+            return None;
+        };
+        let next = match motion.map(|motion| moved(&pose, motion)) {
+            Some(None) => {
+                let from = pose.distance;
+                out(format_args!(
+                    "{ERROR} this motion leaves the legal distances, 0 to {most:08x}; the picture's \
+                     distance is {from:08x}: use a motion that keeps the sum legal"
+                ));
+                return None;
+            }
+            next => next.flatten(),
+        };
+        if self.hold() {
+            self.reset();
+        }
+        self.draw(picture, &pose, next, false);
+        self.tell_page(out);
+        Some(())
+    }
+
+    /// Draws a picture on the next page, and flips. With the pose of the next tick the picture is drawn
+    /// in reduced quality.
+    fn draw(&mut self, picture: Picture, pose: &Pose, next: Option<Pose>, overlay: bool) {
         self.card.bus().take_counts();
+        let State { mapper, order, .. } = self.state;
+        self.stage.set_mapper(mapper);
+        self.stage.set_order(order);
+        self.stage.lower_for(next);
         let background = self.stage.background();
         let split = self.overlay.split().filter(|_| overlay);
-        (self.drawn, self.most) = match self.stage.order() {
+        (self.drawn, self.most) = match order {
             Order::Polygons | Order::Planes => {
                 let mut page = self.card.begin(background);
                 let drawn = paint(&mut self.stage, split, pose, &mut page);
@@ -332,9 +359,13 @@ impl<'a, B: Bus> Show<'a, B> {
             }
         };
         self.card.flip();
-        self.picture = Some(picture);
-        let mark = lower_mark(self.stage.lowered());
-        self.drawn_by = Word::of(format_args!("{}{mark}", self.stage.mapper()));
+        // A motion that reduces no face's quality makes no difference: it is not part of the name.
+        let reduced = next.filter(|_| self.stage.lowered() > 0);
+        self.shown = Some(Shown {
+            picture,
+            motion: reduced.map(|next| motion(pose, &next)),
+            mapper,
+        });
     }
 
     /// Draws the picture of a tick on the next page, and flips.
@@ -346,10 +377,9 @@ impl<'a, B: Bus> Show<'a, B> {
         } else {
             name(&pose)
         };
-        self.stage
-            .lower_for(self.state.lower.then(|| self.state.next_pose(tick)));
+        let next = self.state.lower.then(|| self.state.next_pose(tick));
         let overlay = self.pace.is_some() && self.prepare_overlay(tick);
-        self.draw(picture, &pose, overlay);
+        self.draw(picture, &pose, next, overlay);
     }
 
     /// Whether there is an overlay for the picture of a tick; if so it is ready.
@@ -380,7 +410,9 @@ impl<'a, B: Bus> Show<'a, B> {
         }
         let mut next = self.state;
         let changed = next.change(tick, &change)?;
-        self.adopt(next);
+        if self.adopt(next) {
+            self.reset();
+        }
         match change {
             // What was before makes no difference any more.
             Change::Act(Action::Reset) => self.log.restart(next),
@@ -443,10 +475,10 @@ impl<'a, B: Bus> Show<'a, B> {
             None => {
                 let mut next = self.state;
                 next.change(tick, &change).map(|_| {
-                    self.adopt(next);
+                    let put = self.adopt(next);
                     // It is known, then.
                     let _ = self.log.start().change(tick, &change);
-                    if setting == Setting::Scene {
+                    if put || setting == Setting::Scene {
                         self.reset();
                     }
                 })
@@ -455,21 +487,21 @@ impl<'a, B: Bus> Show<'a, B> {
         known(set, change, out)
     }
 
-    /// Has the next picture drawn as `state` says. For another scene the card is reset, since palette
-    /// and background are others.
-    fn adopt(&mut self, state: State<'a>) {
+    /// Has the next picture drawn as `state` says. Returns whether another scene is on the stage: its
+    /// palette and background are others, so the card must be reset.
+    #[must_use]
+    fn adopt(&mut self, state: State<'a>) -> bool {
         let entry = state.entry;
         self.overlay.renew();
-        self.stage.set_mapper(state.mapper);
-        self.stage.set_order(state.order);
-        if entry.name != self.state.entry.name {
+        let put = entry.name != self.state.entry.name;
+        if put {
             let textures = entry.paint(self.texels);
             self.stage.set(entry.scene(&textures));
             self.offscreen.forget();
             self.overlay.set_palette(self.stage.palette());
-            self.reset();
         }
         self.state = state;
+        put
     }
 
     /// Tells what a setting can be set to.
@@ -486,32 +518,34 @@ impl<'a, B: Bus> Show<'a, B> {
             }
             Setting::Mapper => {
                 for &(name, mapper, about) in Mapper::ALL {
-                    tell(mapper == self.stage.mapper(), name, about);
+                    tell(mapper == self.state.mapper, name, about);
                 }
-                let set = self.stage.mapper();
+                let set = self.state.mapper;
                 if set.name().is_empty() {
                     out(format_args!("*{set} as within-1, with another tolerance"));
                 }
             }
             Setting::Order => {
                 for (name, order, about) in Order::ALL {
-                    tell(order == self.stage.order(), name, about);
+                    tell(order == self.state.order, name, about);
                 }
             }
         }
     }
 
-    /// Stops the show, the card as after the mode set: what follows depends on the commands
-    /// alone, and not on how far the show had come.
-    fn hold(&mut self) {
-        self.pace = None;
+    /// Stops the show. Returns whether it ran: the card must then be reset, so that what follows
+    /// depends on the commands alone, and not on how far the show had come.
+    #[must_use]
+    fn hold(&mut self) -> bool {
         self.overlay.close();
-        self.reset();
+        self.pace.take().is_some()
     }
 
-    /// Sets the card anew: no picture is on it.
+    /// Sets the card's mode and palette again: no picture is on it.
     fn reset(&mut self) {
-        self.picture = None;
+        self.shown = None;
+        (self.drawn, self.most) = (Stats::default(), 0);
+        self.card.bus().take_counts();
         if let Err(error) = self.card.reset(self.stage.palette()) {
             panic!("the card took Mode X before, and does not take it again: {error}");
         }
@@ -520,10 +554,14 @@ impl<'a, B: Bus> Show<'a, B> {
     fn header(&self, content: Content) -> Header<&'static str> {
         Header {
             content,
-            scene: self.stage.name(),
-            pack: self.pack.filter(|_| self.stage.name() == Entry::LOADED),
-            mapper: self.drawn_by.expect("a mapper's name is a word"),
-            picture: self.picture,
+            scene: self.state.entry.name,
+            pack: self.pack.filter(|_| self.state.entry.name == Entry::LOADED),
+            mapper: self.shown.map(|shown| {
+                let name = Word::of(shown.mapper);
+                name.expect("a mapper's name is a word")
+            }),
+            picture: self.shown.map(|shown| shown.picture),
+            motion: self.shown.and_then(|shown| shown.motion),
             start: self.card.start_address(),
             width: WIDTH as u16,
             height: HEIGHT as u16,
@@ -595,16 +633,19 @@ impl<'a, B: Bus> Show<'a, B> {
             Some(_) => out(format_args!("running tick {tick}")),
             None => out(format_args!("held")),
         }
-        out(format_args!("scene {}", self.stage.name()));
-        out(format_args!("mapper {}", self.stage.mapper()));
-        out(format_args!("order {}", self.stage.order()));
-        match self.picture {
-            Some(picture) => out(format_args!("picture {picture}")),
-            None => out(format_args!("picture none")),
-        }
-        if let Some(mapper) = self.drawn_by {
-            out(format_args!("drawn {mapper}"));
-        }
+        let Header {
+            scene,
+            mapper,
+            picture,
+            motion,
+            ..
+        } = self.header(Content::Page);
+        out(format_args!("scene {scene}"));
+        out(format_args!("mapper {}", self.state.mapper));
+        out(format_args!("order {}", self.state.order));
+        out(format_args!("picture {}", OrNone(&picture)));
+        out(format_args!("motion {}", OrNone(&motion)));
+        out(format_args!("drawn {}", OrNone(&mapper)));
         out(format_args!(
             "page {} start {:04x}",
             self.card.shown_page(),
@@ -645,6 +686,29 @@ pub fn pose(scene: &Entry<'_>, picture: Picture) -> Option<Pose> {
                 distance,
             })
         }
+    }
+}
+
+/// The pose a tick after `pose`; none if its distance is outside the legal range.
+fn moved(pose: &Pose, motion: Motion) -> Option<Pose> {
+    let distance = pose.distance.wrapping_add(motion.distance as i32);
+    (0..=Pose::MAX_DISTANCE)
+        .contains(&distance)
+        .then_some(Pose {
+            yaw: pose.yaw.wrapping_add(motion.yaw),
+            pitch: pose.pitch.wrapping_add(motion.pitch),
+            roll: pose.roll.wrapping_add(motion.roll),
+            distance,
+        })
+}
+
+/// The motion from a pose to the one of the next tick.
+fn motion(pose: &Pose, next: &Pose) -> Motion {
+    Motion {
+        yaw: next.yaw.wrapping_sub(pose.yaw),
+        pitch: next.pitch.wrapping_sub(pose.pitch),
+        roll: next.roll.wrapping_sub(pose.roll),
+        distance: next.distance.wrapping_sub(pose.distance) as u32,
     }
 }
 

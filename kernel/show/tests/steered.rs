@@ -1,27 +1,11 @@
 //! A running show on the emulated card, steered by keys and commands, and drawn again from its log.
 
+mod asked;
+
+use asked::{ask, done};
 use emulator::Vga;
-use link::{Action, write_line};
-use show::{KEYS, Memory, Show};
-
-/// The lines of a command's answer.
-fn ask(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
-    let mut bytes = Vec::new();
-    write_line(format_args!("{line}"), |sent| bytes.extend_from_slice(sent));
-    let mut answer = Vec::new();
-    for byte in bytes {
-        show.receive(byte, tick, &mut |line| answer.push(line.to_string()));
-    }
-    assert_eq!(show.bus().take_faults(), [], "{line}");
-    answer
-}
-
-/// The answer of a command that is carried out, without its end.
-fn done(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
-    let mut answer = ask(show, line, tick);
-    assert_eq!(answer.pop().unwrap(), format!("ok {line}"), "{answer:?}");
-    answer
-}
+use link::Action;
+use show::{KEYS, Show};
 
 /// What is shown: the bytes' checksums, and what they are the picture of.
 fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {
@@ -31,7 +15,8 @@ fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {
     evidence[0] = crc.to_string();
     let state = done(show, "state", tick);
     let named = |line: &&String| {
-        ["scene", "mapper", "picture", "drawn"].contains(&line.split(' ').next().unwrap())
+        let names = ["scene", "mapper", "picture", "motion", "drawn"];
+        names.contains(&line.split(' ').next().unwrap())
     };
     evidence.extend(state.iter().filter(named).cloned());
     evidence
@@ -45,10 +30,8 @@ const RELEASED: u8 = 0x80;
 
 #[test]
 fn a_log_brings_back_every_picture_byte_for_byte() {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    let mut random = fastrand::Rng::with_seed(seed);
-    let mut memory = Box::new(Memory::new());
+    let mut random = seeded::generator();
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let (mut tick, mut seen) = (random.u32(..1000), Vec::new());
     for picture in 0..80 {
@@ -84,7 +67,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
     }
     let log = done(&mut show, "log", tick);
     println!("{log:#?}");
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut twin = Show::new(&mut memory, Vga::new(), None).unwrap();
     for (show, start) in [(&mut twin, "hold"), (&mut show, "hold")] {
         done(show, start, 0);
@@ -99,23 +82,25 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
             assert_eq!(&evidence(show, 0), shown, "at {tick}");
         }
     }
-    // A picture's name is enough to draw it.
-    let (tick, shown) = &seen[seen.len() / 2];
-    done(&mut show, &format!("show at {tick}"), 0);
-    let picture = shown
-        .iter()
-        .find_map(|line| line.strip_prefix("picture "))
-        .unwrap();
-    for line in &shown[2..4] {
-        done(&mut twin, line, 0);
+    // A picture's name is enough to draw it, its motion included.
+    for (tick, shown) in &seen {
+        done(&mut show, &format!("show at {tick}"), 0);
+        let [_, _, scene, mapper, picture, motion, _] = &shown[..] else {
+            panic!("{shown:?}")
+        };
+        done(&mut twin, scene, 0);
+        done(&mut twin, mapper, 0);
+        let picture = picture.replacen("picture", "show", 1);
+        let motion = Some(motion).filter(|motion| *motion != "motion none");
+        let motion = motion.map_or(String::new(), |motion| format!(" {motion}"));
+        done(&mut twin, &format!("{picture}{motion}"), 0);
+        assert_eq!(&evidence(&mut twin, 0), shown);
     }
-    done(&mut twin, &format!("show {picture}"), 0);
-    assert_eq!(evidence(&mut twin, 0), evidence(&mut show, 0));
 }
 
 #[test]
 fn a_running_show_can_be_stopped_at_a_tick_of_its_own() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     show.present(10, &mut |_| {});
     done(&mut show, "steer nearer", 10);
@@ -146,7 +131,7 @@ fn a_running_show_can_be_stopped_at_a_tick_of_its_own() {
 
 #[test]
 fn what_cannot_be_steered_is_told() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let refused = |show: &mut Show<'_, Vga>, line, reason| {
         let answer = ask(show, line, 3);
@@ -178,7 +163,7 @@ fn what_cannot_be_steered_is_told() {
 /// Actions act on when the log is full; a reset begins it anew.
 #[test]
 fn a_full_log_is_told_and_steers_on() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     for tick in 0..1027 {
         done(&mut show, "steer next-order", tick);
@@ -217,7 +202,7 @@ fn the_readme_has_every_key() {
 
 #[test]
 fn keys_are_listed_with_what_they_do() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let keys = done(&mut show, "keys", 0);
     assert_eq!(keys.len(), KEYS.len());
@@ -236,7 +221,7 @@ fn keys_are_listed_with_what_they_do() {
 /// What is written costs four writes to Map Mask, and none when it is drawn into RAM first.
 #[test]
 fn an_overlay_is_counted_apart_and_goes_again() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let mut tick = 0;
     let mut present = |show: &mut Show<'_, Vga>| {
@@ -297,7 +282,7 @@ fn an_overlay_is_counted_apart_and_goes_again() {
 #[test]
 fn a_split_view_shows_the_same_part_three_times() {
     const LINES: usize = 200;
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let mut tick = 0;
     let mut pixels = |show: &mut Show<'_, Vga>| {
@@ -358,9 +343,9 @@ fn a_split_view_shows_the_same_part_three_times() {
 /// Lower while it moves, and as it was when it stands; in the log's pictures as in the show's own.
 #[test]
 fn quality_is_lower_while_it_moves_and_only_then() {
-    let mut memory = Box::new(Memory::new());
+    let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
-    let drawn = |evidence: &[String]| evidence.last().unwrap().clone();
+    let motion = |evidence: &[String]| evidence[5].clone();
     let present = |show: &mut Show<'_, Vga>, tick| {
         show.present(tick, &mut |_| {});
         evidence(show, tick)
@@ -377,11 +362,11 @@ fn quality_is_lower_while_it_moves_and_only_then() {
     done(&mut show, "mapper shifts", 200);
     done(&mut show, "steer pause", 200);
     let affine = present(&mut show, 201);
-    let names = [&full, &moving, &standing, &affine].map(|evidence| drawn(evidence));
-    assert_eq!(
-        names,
-        ["drawn exact", "drawn exact~", "drawn exact", "drawn shifts"]
-    );
+    const NONE: &str = "motion none";
+    let motions = [&full, &moving, &standing, &affine].map(|evidence| motion(evidence));
+    let [_, by, ..] = &motions;
+    assert!(by.starts_with("motion ") && by != NONE, "{by}");
+    assert_eq!(motions, [NONE, by, NONE, NONE]);
 
     let log = done(&mut show, "log", 201);
     done(&mut show, "hold", 0);
@@ -397,10 +382,25 @@ fn quality_is_lower_while_it_moves_and_only_then() {
         done(&mut show, &format!("show at {tick}"), 0);
         assert_eq!(&evidence(&mut show, 0), shown, "at {tick}");
     }
-    // A picture by its name is never lower.
+    // A picture by its name is in full quality, unless the name has a motion.
     done(&mut show, "mapper exact", 0);
     done(&mut show, "show 101", 0);
     let named = evidence(&mut show, 0);
-    assert_eq!(drawn(&named), "drawn exact");
+    assert_eq!(motion(&named), NONE);
     assert_ne!(named[0], moving[0]);
+    done(&mut show, &format!("show 101 {by}"), 0);
+    assert_eq!(evidence(&mut show, 0), moving);
+    // A motion that reduces nothing is no part of the name.
+    let still = format!("show 101 motion{}", " 00000000".repeat(4));
+    for name in [still.as_str(), "mapper shifts"] {
+        done(&mut show, name, 0);
+    }
+    assert_eq!(motion(&evidence(&mut show, 0)), NONE);
+    done(&mut show, &format!("show 101 {by}"), 0);
+    assert_eq!(motion(&evidence(&mut show, 0)), NONE);
+    let answer = ask(&mut show, "show 101 motion 0 0 0 80000000", 0);
+    assert!(
+        answer[0].starts_with("error this motion leaves the legal distances"),
+        "{answer:?}"
+    );
 }
