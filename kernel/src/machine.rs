@@ -49,6 +49,7 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     ));
     cpu::init(boot_info.kernel_stack_bottom);
     keyboard::init();
+    serial::listen();
     timer::start();
     let offset = boot_info
         .physical_memory_offset

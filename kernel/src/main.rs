@@ -32,8 +32,12 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     let out: &mut show::Out<'_> = &mut |line| serial::line(line);
     let stopwatch = clock::Stopwatch::start(timer::ticks());
     loop {
-        while let Some(byte) = serial::receive() {
-            match show.receive(byte, timer::ticks(), out) {
+        while let Some(received) = serial::receive() {
+            if received.damaged {
+                show.damage();
+            }
+            show.set_reception(serial::reception());
+            match show.receive(received.byte, timer::ticks(), out) {
                 Some(Request::Fail(fault)) => machine::fail(fault),
                 Some(Request::Leave) => machine::exit(link::Exit::Left),
                 None => {}

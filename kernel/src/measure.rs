@@ -28,8 +28,11 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     };
     let out: &mut cost::Out<'_> = &mut |line| serial::line(line);
     loop {
-        while let Some(byte) = serial::receive() {
-            if machine::undisturbed(|| bench.receive(byte, &clock, out)) {
+        while let Some(received) = serial::receive() {
+            if received.damaged {
+                bench.damage();
+            }
+            if machine::undisturbed(|| bench.receive(received.byte, &clock, out)) {
                 machine::exit(link::Exit::Left);
             }
         }

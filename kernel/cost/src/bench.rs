@@ -116,6 +116,12 @@ impl<'a, B: Bus> Bench<'a, B> {
         self.card.bus()
     }
 
+    /// Says that bytes of the serial line may be missing before the next one, or that the next one
+    /// is damaged: its line is refused ([`Lines::damage`]).
+    pub fn damage(&mut self) {
+        self.lines.damage();
+    }
+
     /// Takes a byte of the serial line; with the one that ends a line, answers it. True when it
     /// asked to leave.
     pub fn receive(&mut self, byte: u8, clock: &Clock, out: &mut Out<'_>) -> bool {

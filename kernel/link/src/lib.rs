@@ -7,10 +7,19 @@
 //! ok show 1000 page 1 *8f3a90c4
 //! ```
 //!
-//! The eight hex digits are the CRC-32 (ISO-HDLC) of everything before ` *`. A line ends in LF;
-//! a CR before it is not part of the line, since a terminal turns LF into CR LF. Lines are
-//! printable ASCII, at most [`MAX_LINE`] bytes. The byte [`CANCEL`] throws away what stood before
-//! it on its line.
+//! The eight hex digits are the CRC-32 (ISO-HDLC) of everything before ` *`. A line ends in LF, in
+//! CR, or in CR LF. Both ends of the line send LF; the Enter key of a terminal sends CR, and some
+//! programs on the way turn LF into CR LF. Lines are printable ASCII, at most [`MAX_LINE`] bytes.
+//! Backspace and Delete take the last byte back, and the byte [`CANCEL`] (Ctrl-X) takes back the
+//! whole line so far.
+//!
+//! The kernel does not echo what it receives: a person at a terminal sees the answers alone, and
+//! switches the terminal's own echo on. A terminal that shows each line further to the right than
+//! the line before has to add a CR to each LF: `picocom --echo --imap lfcrlf` does both.
+//!
+//! The kernel receives at any time, also while it draws. A line from which the UART has lost a byte,
+//! or in which a byte arrived damaged, is answered with `error` and is not carried out; of two lines
+//! beside a loss both are refused.
 //!
 //! The host sends a [`Command`] a line; it may end it in a checksum too, and then the kernel
 //! checks it. The kernel answers with any number of lines and closes with one that begins with
@@ -32,7 +41,7 @@
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
 //! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
-//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `motion none` (a motion if it had faces drawn in reduced quality), `drawn shifts` (the picture's mapper; `none` without a picture), `page 1 start 4b00` |
+//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `motion none` (a motion if it had faces drawn in reduced quality), `drawn shifts` (the picture's mapper; `none` without a picture), `page 1 start 4b00`, `serial overruns 0 damaged 0 full 0` ([`Reception`]) |
 //! | `version` | `crystal-ball 0.1.0 protocol 6 dump 4` |
 //! | `fail KIND` | none: the kernel breaks in the way that is named ([`Fault`]) |
 //! | `leave` | after the `ok` QEMU ends |
@@ -92,6 +101,18 @@ pub const CANCEL: u8 = 0x18;
 pub const OK: &str = "ok";
 /// First word of an answer's last line when it was not.
 pub const ERROR: &str = "error";
+
+/// What went wrong on the way into the kernel, counted since its start.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Reception {
+    /// Times that the UART lost bytes, because its FIFO was full.
+    pub overruns: u32,
+    /// Bytes with a parity or framing error, and breaks.
+    pub damaged: u32,
+    /// Times that the kernel's own buffer was full. That alone loses nothing on a line whose sender
+    /// can wait, such as QEMU's; on a wire overruns follow.
+    pub full: u32,
+}
 
 /// What the kernel writes to QEMU's `isa-debug-exit` device. QEMU's exit code is twice that
 /// plus one, so none of them is 0 or 1, which QEMU uses itself.

@@ -2,12 +2,23 @@
 
 use crate::{CANCEL, MAX_LINE};
 
+/// Backspace and Delete: either takes the last byte of a line back.
+const ERASE: [u8; 2] = [0x08, 0x7F];
+
 /// Collects bytes until a line is whole, in a fixed buffer.
+///
+/// LF, CR, and CR LF each end a line: a host sends LF, the Enter key of a terminal sends CR, and some
+/// programs send both. Backspace and Delete take the last byte back, [`CANCEL`] the whole line.
 #[derive(Clone, Debug)]
 pub struct Lines {
+    /// The line's first bytes.
     bytes: [u8; MAX_LINE],
+    /// The line's length. Bytes past the buffer are counted, so that they can be taken back.
     len: usize,
-    noise: Option<Noise>,
+    /// The last byte was a CR: an LF right after it ends no other line.
+    returned: bool,
+    /// Bytes of this line were lost or damaged.
+    damaged: bool,
 }
 
 /// Why a line was thrown away.
@@ -17,6 +28,8 @@ pub enum Noise {
     TooLong,
     /// It has a byte that is not printable ASCII.
     NotText(u8),
+    /// Bytes of it were lost or damaged on the wire ([`Lines::damage`]).
+    Damaged,
 }
 
 impl core::fmt::Display for Noise {
@@ -24,6 +37,7 @@ impl core::fmt::Display for Noise {
         match self {
             Self::TooLong => write!(f, "a line of more than {MAX_LINE} bytes"),
             Self::NotText(byte) => write!(f, "a line with the byte {byte:02x}"),
+            Self::Damaged => f.write_str("a line with bytes that were lost or damaged on the wire"),
         }
     }
 }
@@ -34,40 +48,54 @@ impl Lines {
         Self {
             bytes: [0; MAX_LINE],
             len: 0,
-            noise: None,
+            returned: false,
+            damaged: false,
         }
     }
 
-    /// Takes a byte; with the LF that ends a line, the line, or why it is none.
-    ///
-    /// A CR counts only before the LF: anywhere else it is noise.
+    /// Notes that bytes may be missing here, or that the next byte is not the one that was sent: the
+    /// line that the next byte belongs to is refused, unless it is cancelled.
+    pub fn damage(&mut self) {
+        self.damaged = true;
+        // An LF belonged to the CR, or bytes between the two are lost.
+        self.returned = false;
+    }
+
+    /// Takes a byte. Returns the line if the byte ends it, or why there is none.
     pub fn push(&mut self, byte: u8) -> Option<Result<&str, Noise>> {
-        if byte == CANCEL {
-            (self.len, self.noise) = (0, None);
-            return None;
-        }
-        if byte != b'\n' {
-            match self.bytes.get_mut(self.len) {
-                Some(place) => {
-                    *place = byte;
-                    self.len += 1;
-                }
-                // The CR of a line that just fits.
-                None if byte == b'\r' => {}
-                None => self.noise = Some(Noise::TooLong),
+        let returned = core::mem::replace(&mut self.returned, byte == b'\r');
+        match byte {
+            b'\n' if returned => None,
+            b'\n' | b'\r' => Some(self.end()),
+            CANCEL => {
+                (self.len, self.damaged) = (0, false);
+                None
             }
-            return None;
+            byte if ERASE.contains(&byte) => {
+                self.len = self.len.saturating_sub(1);
+                None
+            }
+            byte => {
+                if let Some(place) = self.bytes.get_mut(self.len) {
+                    *place = byte;
+                }
+                self.len = self.len.saturating_add(1);
+                None
+            }
         }
+    }
+
+    /// The line so far, and begins the next one.
+    fn end(&mut self) -> Result<&str, Noise> {
         let len = core::mem::take(&mut self.len);
-        if let Some(noise) = self.noise.take() {
-            return Some(Err(noise));
+        if core::mem::take(&mut self.damaged) {
+            return Err(Noise::Damaged);
         }
-        let line = &self.bytes[..len];
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        if let Some(&byte) = line.iter().find(|b| !(b' '..=b'~').contains(b)) {
-            return Some(Err(Noise::NotText(byte)));
+        let line = self.bytes.get(..len).ok_or(Noise::TooLong)?;
+        match line.iter().find(|byte| !(b' '..=b'~').contains(byte)) {
+            Some(&byte) => Err(Noise::NotText(byte)),
+            None => core::str::from_utf8(line).map_err(|_| Noise::NotText(line[0])),
         }
-        Some(core::str::from_utf8(line).map_err(|_| Noise::NotText(line[0])))
     }
 }
 
@@ -92,24 +120,47 @@ mod tests {
             .collect()
     }
 
+    fn ok(text: &str) -> Result<String, Noise> {
+        Ok(text.to_string())
+    }
+
     #[test]
-    fn lines_end_in_lf_or_cr_lf() {
-        let ok = |text: &str| Ok(text.to_string());
-        assert_eq!(lines(b"a\nb c\r\n\nd"), [ok("a"), ok("b c"), ok("")]);
+    fn lines_end_in_lf_or_cr_or_both() {
+        assert_eq!(
+            lines(b"a\nb c\r\n\nd\re\r\n\r\n\r\rf"),
+            ["a", "b c", "", "d", "e", "", "", ""].map(ok)
+        );
+        // Whatever stands between the two, the LF ends a line of its own.
+        assert_eq!(lines(b"a\r \x08\nb\r\x18\n"), ["a", "", "b", ""].map(ok));
+    }
+
+    #[test]
+    fn a_line_is_edited_by_backspace_and_delete() {
+        assert_eq!(
+            lines(b"shp\x08ow\x7f\x7f\x7fhow 1\n\x08\x7fhold\r"),
+            ["show 1", "hold"].map(ok)
+        );
+        // What is not text is taken back like any byte.
+        assert_eq!(lines(b"a\xff\x08b\n"), [ok("ab")]);
+        // And what is too long.
+        let mut bytes = std::vec![b'x'; MAX_LINE + 2];
+        bytes.extend([0x7F; 2]);
+        bytes.push(b'\n');
+        assert_eq!(lines(&bytes), [ok(&"x".repeat(MAX_LINE))]);
     }
 
     #[test]
     fn noise_costs_a_line_and_no_more() {
         let mut bytes = std::vec![b'x'; 1_000_000];
-        bytes.extend_from_slice(b"\nshow 1\n\xFF\nc\rr\nhold\n");
+        bytes.extend_from_slice(b"\nshow 1\n\xFF\nc\x1b[A\nhold\n");
         assert_eq!(
             lines(&bytes),
             [
                 Err(Noise::TooLong),
-                Ok("show 1".to_string()),
+                ok("show 1"),
                 Err(Noise::NotText(0xFF)),
-                Err(Noise::NotText(b'\r')),
-                Ok("hold".to_string()),
+                Err(Noise::NotText(0x1B)),
+                ok("hold"),
             ]
         );
     }
@@ -118,18 +169,76 @@ mod tests {
     fn a_cancelled_line_leaves_nothing() {
         let mut bytes = std::vec![b'x'; 2 * MAX_LINE];
         bytes.extend_from_slice(b"\x18panic\n\xFFab\x18\nc\n");
-        let expected = ["panic", "", "c"].map(|text| Ok(text.to_string()));
-        assert_eq!(lines(&bytes), expected);
+        assert_eq!(lines(&bytes), ["panic", "", "c"].map(ok));
     }
 
     #[test]
     fn the_longest_line_fits() {
-        for end in ["\n", "\r\n"] {
+        for end in ["\n", "\r\n", "\r"] {
             let longest = "x".repeat(MAX_LINE);
             let line = std::format!("{longest}{end}");
             assert_eq!(lines(line.as_bytes()), [Ok(longest)]);
+            let line = std::format!("{}{end}", "x".repeat(MAX_LINE + 1));
+            assert_eq!(lines(line.as_bytes()), [Err(Noise::TooLong)]);
         }
-        let line = std::format!("{}\n", "x".repeat(MAX_LINE + 1));
-        assert_eq!(lines(line.as_bytes()), [Err(Noise::TooLong)]);
+    }
+
+    #[test]
+    fn a_damaged_line_is_refused_and_no_other() {
+        let mut lines = Lines::new();
+        let mut heard = Vec::new();
+        for &byte in b"hold\nsho!w 1\rrun\n!show!\n!x\x18run\r!\n" {
+            match byte {
+                b'!' => lines.damage(),
+                byte => heard.extend(lines.push(byte).map(|line| line.map(ToString::to_string))),
+            }
+        }
+        let damaged = || Err(Noise::Damaged);
+        assert_eq!(
+            heard,
+            [
+                ok("hold"),
+                damaged(),
+                ok("run"),
+                damaged(),
+                ok("run"),
+                damaged()
+            ]
+        );
+    }
+
+    /// Any bytes: the same lines as from a text editor that has all the room in the world.
+    #[test]
+    fn any_bytes_give_the_lines_of_a_simple_model() {
+        let mut random = seeded::generator();
+        let special = [b'\n', b'\r', b'\r', 0x08, 0x7F, CANCEL, 0xFF, 0x1B];
+        for _ in 0..500 {
+            let rare = random.u32(2..2_000);
+            let bytes: Vec<u8> = (0..random.usize(0..5_000))
+                .map(|_| match random.u32(..rare) {
+                    0 => special[random.usize(..special.len())],
+                    _ => random.u8(b' '..=b'~'),
+                })
+                .collect();
+            let (mut expected, mut line) = (Vec::new(), Vec::new());
+            for (at, &byte) in bytes.iter().enumerate() {
+                match byte {
+                    b'\n' if at > 0 && bytes[at - 1] == b'\r' => {}
+                    b'\n' | b'\r' => {
+                        let text = core::mem::take(&mut line);
+                        let bad = text.iter().find(|byte| !(32..127).contains(*byte));
+                        expected.push(match bad {
+                            _ if text.len() > MAX_LINE => Err(Noise::TooLong),
+                            Some(&bad) => Err(Noise::NotText(bad)),
+                            None => Ok(String::from_utf8(text).unwrap()),
+                        });
+                    }
+                    0x08 | 0x7F => _ = line.pop(),
+                    CANCEL => line.clear(),
+                    byte => line.push(byte),
+                }
+            }
+            assert_eq!(lines(&bytes), expected);
+        }
     }
 }

@@ -23,7 +23,7 @@ use core::fmt;
 use link::dump::{self, Header, OrNone};
 use link::{
     Action, Change, Command, Content, ERROR, Fault, Lines, Motion, OK, PROTOCOL, Picture, RUNNING,
-    Setting, Word,
+    Reception, Setting, Word,
 };
 use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, SetError, Tally, WIDTH};
 use pack::{Arena, Pack};
@@ -122,6 +122,8 @@ pub struct Show<'a, B> {
     keyboard: Keyboard,
     /// The keyboard's codes: taken, and lost before.
     codes: (u32, u32),
+    /// What went wrong on the serial line.
+    reception: Reception,
     /// Where the scene's texture is painted.
     texels: &'a mut [u8; MAX_TEXELS],
     stage: Stage<'a>,
@@ -156,6 +158,7 @@ impl<'a, B: Bus> Show<'a, B> {
             overlay: Overlay::new(&mut memory.writing, stage.palette()),
             keyboard: Keyboard::new(),
             codes: (0, 0),
+            reception: Reception::default(),
             texels: &mut memory.texels,
             card: ModeX::set(Counted::new(bus), stage.palette())?,
             stage,
@@ -209,6 +212,17 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Says how many codes the machine could not keep until they were fetched, since its start.
     pub fn set_lost_keys(&mut self, codes: u32) {
         self.codes.1 = codes;
+    }
+
+    /// Says what went wrong on the way of the serial line's bytes, since the machine's start.
+    pub fn set_reception(&mut self, reception: Reception) {
+        self.reception = reception;
+    }
+
+    /// Says that bytes of the serial line may be missing before the next one, or that the next one
+    /// is damaged: its line is refused ([`Lines::damage`]).
+    pub fn damage(&mut self) {
+        self.lines.damage();
     }
 
     /// Takes a byte of the serial line; with the one that ends a line, obeys it.
@@ -650,6 +664,14 @@ impl<'a, B: Bus> Show<'a, B> {
             "page {} start {:04x}",
             self.card.shown_page(),
             self.card.start_address()
+        ));
+        let Reception {
+            overruns,
+            damaged,
+            full,
+        } = self.reception;
+        out(format_args!(
+            "serial overruns {overruns} damaged {damaged} full {full}"
         ));
     }
 }

@@ -19,7 +19,7 @@ use x86_64::structures::gdt::{Descriptor, GlobalDescriptorTable, SegmentSelector
 use x86_64::structures::idt::InterruptDescriptorTable;
 use x86_64::structures::tss::TaskStateSegment;
 
-use super::{keyboard, report, timer};
+use super::{keyboard, report, serial, timer};
 
 /// Vector of IRQ 0; the ones below are the CPU's exceptions.
 const IRQ_BASE: u8 = 32;
@@ -247,8 +247,10 @@ extern "C" fn dispatch(frame: &Frame) {
             keyboard::take();
             end_of_interrupt(IRQ_KEYBOARD);
         }
-        // The byte stays in the FIFO; waking the processor was all.
-        IRQ_SERIAL => end_of_interrupt(IRQ_SERIAL),
+        IRQ_SERIAL => {
+            serial::take();
+            end_of_interrupt(IRQ_SERIAL);
+        }
         IRQ_SPURIOUS => {}
         _ => report::exception(name(frame), frame),
     }

@@ -6,9 +6,10 @@
 //! of set 1 whatever the keyboard speaks. Left as they are: the keyboard's rate of repeats, its
 //! lights, and its own code set.
 
-use core::sync::atomic::{AtomicU8, AtomicU32, Ordering};
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::ports;
+use crate::ring::Ring;
 
 /// Data: codes in, and the byte of a command out.
 const DATA: u16 = 0x60;
@@ -26,29 +27,30 @@ const NOTHING: u8 = 0xFF;
 
 const READ_CONFIGURATION: u8 = 0x20;
 const WRITE_CONFIGURATION: u8 = 0x60;
+const DISABLE_MOUSE: u8 = 0xA7;
+const DISABLE_KEYBOARD: u8 = 0xAD;
 const ENABLE_KEYBOARD: u8 = 0xAE;
 /// Interrupt for the keyboard, and its codes translated to set 1.
 const ON: u8 = 0x41;
-/// Interrupt for the mouse, and the keyboard's clock stopped.
-const OFF: u8 = 0x12;
-/// The mouse's clock stopped.
-const MOUSE_STOPPED: u8 = 0x20;
+/// Interrupt for the mouse.
+const OFF: u8 = 0x02;
+/// The clocks of keyboard and mouse stopped.
+const STOPPED: u8 = 0x30;
 
 /// Polls of a status bit before the controller is given up: it answers within some milliseconds, and
 /// a poll takes about a microsecond.
 const POLLS: u32 = 100_000;
 
-/// Codes that were not fetched yet: what a keyboard sends in three seconds. A power of two, so that
-/// counters may go around.
+/// Codes that wait for the program: what a keyboard sends in three seconds.
 const RING: usize = 128;
-
-static CODES: [AtomicU8; RING] = [const { AtomicU8::new(0) }; RING];
-/// Codes stored, by the interrupt handler alone; fetched, by the program alone.
-static STORED: AtomicU32 = AtomicU32::new(0);
-static FETCHED: AtomicU32 = AtomicU32::new(0);
+static CODES: Ring<RING> = Ring::new();
+/// Codes that found no room.
 static LOST: AtomicU32 = AtomicU32::new(0);
 
 /// Sets the controller up. A machine without one runs all the same, and no key does anything.
+///
+/// Both ports are off until the end: a byte that a device sends between the command and the
+/// controller's answer would be taken for the configuration byte.
 ///
 /// Called with interrupts off, the keyboard's not masked: a code that came before would keep the
 /// request up, and no other one would be seen.
@@ -56,10 +58,13 @@ pub fn init() {
     if status() == NOTHING {
         return;
     }
+    command(DISABLE_KEYBOARD);
+    command(DISABLE_MOUSE);
+    wait(|status| status & INPUT_FULL == 0);
     drain();
     command(READ_CONFIGURATION);
     if wait(|status| status & OUTPUT_FULL != 0) {
-        let configuration = read() & !OFF | ON | MOUSE_STOPPED;
+        let configuration = read() & !OFF | ON | STOPPED;
         command(WRITE_CONFIGURATION);
         if wait(|status| status & INPUT_FULL == 0) {
             // SAFETY: the configuration byte, which the controller waits for.
@@ -73,18 +78,12 @@ pub fn init() {
 
 /// The next code, if any.
 pub fn receive() -> Option<u8> {
-    let fetched = FETCHED.load(Ordering::Relaxed);
-    if fetched == STORED.load(Ordering::Acquire) {
-        return None;
-    }
-    let code = CODES[fetched as usize % RING].load(Ordering::Relaxed);
-    FETCHED.store(fetched.wrapping_add(1), Ordering::Release);
-    Some(code)
+    CODES.pop().map(|code| code as u8)
 }
 
 /// Whether a code is waiting.
 pub fn has_received() -> bool {
-    FETCHED.load(Ordering::Relaxed) != STORED.load(Ordering::Acquire)
+    !CODES.is_empty()
 }
 
 /// Codes that found no room.
@@ -101,20 +100,10 @@ pub(super) fn take() {
             return;
         }
         let code = read();
-        if status & FROM_MOUSE == 0 {
-            store(code);
+        if status & FROM_MOUSE == 0 && !CODES.push(code.into()) {
+            LOST.fetch_add(1, Ordering::Relaxed);
         }
     }
-}
-
-fn store(code: u8) {
-    let stored = STORED.load(Ordering::Relaxed);
-    if stored.wrapping_sub(FETCHED.load(Ordering::Acquire)) as usize == RING {
-        LOST.fetch_add(1, Ordering::Relaxed);
-        return;
-    }
-    CODES[stored as usize % RING].store(code, Ordering::Relaxed);
-    STORED.store(stored.wrapping_add(1), Ordering::Release);
 }
 
 fn status() -> u8 {

@@ -2,63 +2,141 @@
 
 use core::fmt;
 
-use link::{ACKNOWLEDGE, CANCEL};
+use link::{ACKNOWLEDGE, CANCEL, Reception};
 use spin::Mutex;
 use uart_16550::backend::PioBackend;
 use uart_16550::spec::registers::{FifoTriggerLevel, IER};
 use uart_16550::{BaudRate, Config, Uart16550};
 
 use super::{ports, timer};
+use crate::receiver::{Received, Receiver, Uart};
 
 /// COM1's base port.
 const COM1: u16 = 0x3F8;
+const DATA: u16 = COM1;
+const INTERRUPT_ENABLE: u16 = COM1 + 1;
+const LINE_STATUS: u16 = COM1 + 5;
+const DATA_READY: u8 = 0x01;
+const TRANSMITTER_EMPTY: u8 = 0x20;
+/// Bytes that the transmitter takes at once.
+const FIFO: usize = 16;
 
-/// The port, once it was found.
-static SERIAL: Mutex<Option<Uart16550<PioBackend>>> = Mutex::new(None);
+/// Bytes that wait for the program: what arrives in 0.35 s at 115 200 baud.
+const RING: usize = 4096;
+static RECEIVER: Receiver<RING> = Receiver::new();
+
+/// The port for sending, once it was found. The interrupt handler reaches the receiver's registers
+/// without the lock.
+static SERIAL: Mutex<Option<Port>> = Mutex::new(None);
+
+/// COM1's registers.
+#[derive(Debug)]
+struct Port {
+    /// Bytes that the transmitter takes at once: 1 if the UART has no FIFO.
+    room: usize,
+}
+
+/// COM1's registers as the receiver needs them.
+struct Com1;
+
+impl Uart for Com1 {
+    fn line_status(&mut self) -> u8 {
+        // SAFETY: reading COM1's Line Status touches no memory.
+        unsafe { ports::in8(LINE_STATUS) }
+    }
+
+    fn data(&mut self) -> u8 {
+        // SAFETY: reading COM1's data register takes a byte and touches no memory.
+        unsafe { ports::in8(DATA) }
+    }
+
+    fn set_interrupt(&mut self, on: bool) {
+        let enabled = if on { IER::DATA_READY } else { IER::empty() };
+        // SAFETY: COM1's interrupt has a handler, and the register touches no memory.
+        unsafe { ports::out8(INTERRUPT_ENABLE, enabled.bits()) }
+    }
+}
 
 /// Finds and sets up the port. A machine without one runs all the same, and says nothing.
 ///
-/// Set: 115 200 baud, 8-N-1, FIFO on, an interrupt for bytes received, which wakes the processor. Left unset: everything about modem control.
+/// Set: 115 200 baud, 8-N-1, FIFO on, no interrupt yet ([`listen`]). Left unset: everything about
+/// modem control.
 pub fn init() {
     let Some(mut uart) = port() else { return };
     let config = Config {
         baud_rate: BaudRate::Baud115200,
-        interrupts: IER::DATA_READY,
-        // An interrupt for each byte would cost ten times the time when much is said. What is left
-        // below the level comes with the FIFO's time-out, four characters (0.35 ms) later.
-        fifo_trigger_level: Some(FifoTriggerLevel::Fourteen),
+        interrupts: IER::empty(),
+        // The other half of the FIFO fills in 0.7 ms, more than twice what the keyboard's handler may
+        // take. What is left below the level comes with the FIFO's time-out, four characters
+        // (0.35 ms) later.
+        fifo_trigger_level: Some(FifoTriggerLevel::Eight),
         ..Config::DEFAULT
     };
     if uart.init(config).is_ok() {
-        *SERIAL.lock() = Some(uart);
+        let room = if uart.fifo_enabled() { FIFO } else { 1 };
+        *SERIAL.lock() = Some(Port { room });
+    }
+}
+
+/// Has bytes received by interrupt from now on. The interrupt controller must be set up: it sees only
+/// the edge when a request begins, and bytes that wait already begin one here.
+pub fn listen() {
+    if SERIAL.lock().is_some() {
+        Com1.set_interrupt(true);
     }
 }
 
 /// Writes one framed line.
 pub fn line(text: fmt::Arguments<'_>) {
-    if let Some(uart) = &mut *SERIAL.lock() {
-        link::write_line(text, |bytes| uart.send_bytes_exact(bytes));
+    if let Some(port) = &mut *SERIAL.lock() {
+        link::write_line(text, |bytes| port.send(bytes));
     }
 }
 
 /// Cancels the line that something else may have begun.
 pub fn cancel_line() {
-    if let Some(uart) = &mut *SERIAL.lock() {
-        uart.send_bytes_exact(&[CANCEL]);
+    if let Some(port) = &mut *SERIAL.lock() {
+        port.send(&[CANCEL]);
+    }
+}
+
+impl Port {
+    /// Sends bytes, and waits for a host that does not read.
+    fn send(&mut self, bytes: &[u8]) {
+        for bytes in bytes.chunks(self.room) {
+            while !super::undisturbed(|| RECEIVER.can_send(&mut Com1)) {
+                core::hint::spin_loop();
+            }
+            for &byte in bytes {
+                // SAFETY: writing COM1's data register sends a byte and touches no memory.
+                unsafe { ports::out8(DATA, byte) };
+            }
+        }
     }
 }
 
 /// The next byte that was received, if any.
-pub fn receive() -> Option<u8> {
-    SERIAL.lock().as_mut()?.try_receive_byte().ok()
+pub fn receive() -> Option<Received> {
+    RECEIVER.fetch(&mut Com1)
 }
 
 /// Whether a byte is waiting.
 pub fn has_received() -> bool {
-    let mut serial = SERIAL.lock();
-    serial
-        .as_mut()
-        .is_some_and(|uart| uart.ready_to_receive().is_ok())
+    RECEIVER.has_received()
+}
+
+/// What went wrong on the way in, since the start.
+pub fn reception() -> Reception {
+    Reception {
+        overruns: RECEIVER.overruns(),
+        damaged: RECEIVER.damaged(),
+        full: RECEIVER.pauses(),
+    }
+}
+
+/// The interrupt handler's part.
+pub(super) fn take() {
+    RECEIVER.take(&mut Com1);
 }
 
 fn port() -> Option<Uart16550<PioBackend>> {
@@ -76,10 +154,6 @@ pub struct Unlocked {
 /// Timer periods that a whole report may wait for its host: 5 s at 60 Hz, and 16 s if the failure
 /// came before the timer was set.
 const PATIENCE: u32 = 300;
-
-const LINE_STATUS: u16 = COM1 + 5;
-const DATA_READY: u8 = 0x01;
-const TRANSMITTER_EMPTY: u8 = 0x20;
 
 impl Unlocked {
     /// Takes the port over; what the lock's holder had begun of a line is cancelled.
@@ -99,8 +173,7 @@ impl Unlocked {
     /// Waits until the host acknowledges; commands that were under way are thrown away.
     pub fn wait_for_host(&mut self) {
         while self.wait(DATA_READY) {
-            // SAFETY: reading COM1's data register takes a byte and touches no memory.
-            if unsafe { ports::in8(COM1) } == ACKNOWLEDGE {
+            if Com1.data() == ACKNOWLEDGE {
                 return;
             }
         }
@@ -110,15 +183,14 @@ impl Unlocked {
         for &byte in bytes {
             self.wait(TRANSMITTER_EMPTY);
             // SAFETY: writing COM1's data register sends a byte and touches no memory.
-            unsafe { ports::out8(COM1, byte) };
+            unsafe { ports::out8(DATA, byte) };
         }
     }
 
     /// Whether `status` came before patience was over.
     fn wait(&mut self, status: u8) -> bool {
         loop {
-            // SAFETY: reading COM1's line status touches no memory.
-            if unsafe { ports::in8(LINE_STATUS) } & status != 0 {
+            if Com1.line_status() & status != 0 {
                 return true;
             }
             if self.clock.is_over() {

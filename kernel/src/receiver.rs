@@ -1,0 +1,400 @@
+//! Received bytes on their way from the UART to the program.
+//!
+//! The UART's FIFO holds 16 bytes: 1.4 ms at 115 200 baud, and a frame takes longer. The interrupt
+//! handler moves the bytes from the FIFO into a [`Ring`], which the program empties between frames.
+//!
+//! When the ring is full the handler leaves the bytes in the FIFO and switches the UART's interrupt
+//! off; the program switches it on again when half of the ring is free. QEMU then waits with the
+//! bytes that follow, so nothing is lost. A real UART overruns its FIFO and reports that.
+//!
+//! A line with a lost or damaged byte must never be carried out, not even the half of it that
+//! arrived. [`Received::damaged`] marks the bytes that may stand beside a loss.
+
+use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
+
+use crate::ring::Ring;
+
+/// Line Status bit 0: a byte can be read.
+const DATA_READY: u8 = 0x01;
+/// Line Status bit 1: a byte arrived while the FIFO was full, and is lost.
+const OVERRUN: u8 = 0x02;
+/// Line Status bits 2 to 4: the next byte has a parity error, a framing error, or is a break.
+const DAMAGED: u8 = 0x1C;
+/// Line Status bit 5: the transmitter takes bytes.
+const TRANSMITTER_READY: u8 = 0x20;
+/// The value that a port without a device reads. A UART never sets bit 7 without a FIFO error, and
+/// never all bits.
+const NOTHING: u8 = 0xFF;
+/// Bytes that the receiver's FIFO holds.
+const FIFO: u8 = 16;
+/// Set in a ring's item if the byte is damaged.
+const MARK: u16 = 0x100;
+
+/// How a UART is reached.
+pub trait Uart {
+    /// Reads Line Status. The read clears the UART's error bits.
+    fn line_status(&mut self) -> u8;
+    /// Takes the oldest byte from the FIFO.
+    fn data(&mut self) -> u8;
+    /// Switches the interrupt for received bytes on or off.
+    fn set_interrupt(&mut self, on: bool);
+}
+
+/// A received byte.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Received {
+    /// The byte.
+    pub byte: u8,
+    /// Bytes before this one may be lost, or this byte arrived damaged.
+    pub damaged: bool,
+}
+
+/// A ring of `SIZE` bytes behind a UART, and counters of what went wrong.
+#[derive(Debug)]
+pub struct Receiver<const SIZE: usize> {
+    ring: Ring<SIZE>,
+    /// The next so many bytes are marked as damaged.
+    suspect: AtomicU8,
+    /// The UART's interrupt is off, because the ring was full.
+    paused: AtomicBool,
+    overruns: AtomicU32,
+    damaged: AtomicU32,
+    pauses: AtomicU32,
+}
+
+impl<const SIZE: usize> Receiver<SIZE> {
+    /// Nothing received.
+    pub const fn new() -> Self {
+        Self {
+            ring: Ring::new(),
+            suspect: AtomicU8::new(0),
+            paused: AtomicBool::new(false),
+            overruns: AtomicU32::new(0),
+            damaged: AtomicU32::new(0),
+            pauses: AtomicU32::new(0),
+        }
+    }
+
+    /// The interrupt handler's part: moves bytes from the FIFO into the ring, until the FIFO is empty
+    /// or the ring is full. It must come that far: the interrupt controller sees only the edge when
+    /// the UART's request begins.
+    pub fn take(&self, uart: &mut impl Uart) {
+        // Fullness comes first: reading Line Status forgets what it says of the next byte.
+        while !self.ring.is_full() {
+            let status = uart.line_status();
+            if status == NOTHING {
+                return;
+            }
+            self.note(status);
+            if status & DATA_READY == 0 {
+                return;
+            }
+            let byte = u16::from(uart.data());
+            let suspect = self.suspect.load(Ordering::Relaxed);
+            self.suspect
+                .store(suspect.saturating_sub(1), Ordering::Relaxed);
+            let mark = if suspect > 0 { MARK } else { 0 };
+            // The handler alone stores, and there was room.
+            let _ = self.ring.push(byte | mark);
+        }
+        self.pauses.fetch_add(1, Ordering::Relaxed);
+        self.paused.store(true, Ordering::Relaxed);
+        uart.set_interrupt(false);
+    }
+
+    /// The program's part: the oldest byte in the ring.
+    pub fn fetch(&self, uart: &mut impl Uart) -> Option<Received> {
+        let item = self.ring.pop();
+        if self.paused.load(Ordering::Relaxed) && self.ring.len() <= SIZE / 2 {
+            // The handler does not run before the next line: its interrupt is off.
+            self.paused.store(false, Ordering::Relaxed);
+            uart.set_interrupt(true);
+        }
+        item.map(|item| Received {
+            byte: item as u8,
+            damaged: item & MARK != 0,
+        })
+    }
+
+    /// Whether the ring holds bytes.
+    pub fn has_received(&self) -> bool {
+        !self.ring.is_empty()
+    }
+
+    /// Whether the transmitter takes bytes. Who sends has to ask here: Line Status forgets an error
+    /// when it is read. Called with interrupts off, so that the handler takes no byte between the read
+    /// and the note of it.
+    pub fn can_send(&self, uart: &mut impl Uart) -> bool {
+        let status = uart.line_status();
+        self.note(status);
+        status & TRANSMITTER_READY != 0
+    }
+
+    /// Notes the errors in a value of Line Status.
+    fn note(&self, status: u8) {
+        if status & OVERRUN != 0 {
+            self.overruns.fetch_add(1, Ordering::Relaxed);
+            // The FIFO was full when the byte was lost, and nothing was taken from it since: the gap
+            // lies behind the bytes that it holds, before the one that follows. A UART without a FIFO
+            // lost the byte before its next one. All of them are marked.
+            self.suspect.store(FIFO + 1, Ordering::Relaxed);
+        }
+        if status & DAMAGED != 0 {
+            self.damaged.fetch_add(1, Ordering::Relaxed);
+            self.suspect.fetch_max(1, Ordering::Relaxed);
+        }
+    }
+
+    /// Times that the UART lost bytes, since its FIFO was full.
+    pub fn overruns(&self) -> u32 {
+        self.overruns.load(Ordering::Relaxed)
+    }
+
+    /// Bytes that arrived with a parity error, a framing error or as a break.
+    pub fn damaged(&self) -> u32 {
+        self.damaged.load(Ordering::Relaxed)
+    }
+
+    /// Times that the ring was full.
+    pub fn pauses(&self) -> u32 {
+        self.pauses.load(Ordering::Relaxed)
+    }
+}
+
+impl<const SIZE: usize> Default for Receiver<SIZE> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use link::Lines;
+    use std::collections::VecDeque;
+
+    /// A UART with a FIFO of 16 bytes, as its datasheet says.
+    #[derive(Default)]
+    struct Model {
+        fifo: VecDeque<(u8, u8)>,
+        overrun: u8,
+        on: bool,
+        /// Who sends waits while the FIFO is full, as QEMU does.
+        waits: bool,
+    }
+
+    impl Model {
+        fn on() -> Self {
+            let on = true;
+            Self {
+                on,
+                ..Self::default()
+            }
+        }
+
+        /// A byte arrives on the wire; with `errors` in the bits of Line Status.
+        fn arrive(&mut self, byte: u8, errors: u8) {
+            if self.fifo.len() < usize::from(FIFO) {
+                self.fifo.push_back((byte, errors));
+            } else {
+                assert!(!self.waits);
+                self.overrun = OVERRUN;
+            }
+        }
+
+        /// The request to the interrupt controller, at a trigger level of 8 bytes.
+        fn requests(&self) -> bool {
+            self.on && self.fifo.len() >= 8
+        }
+    }
+
+    impl Uart for Model {
+        fn line_status(&mut self) -> u8 {
+            let next = self.fifo.front_mut();
+            let ready = if next.is_some() { DATA_READY } else { 0 };
+            let errors = next.map_or(0, |(_, errors)| std::mem::take(errors));
+            ready | errors | std::mem::take(&mut self.overrun) | TRANSMITTER_READY
+        }
+
+        fn data(&mut self) -> u8 {
+            self.fifo.pop_front().map_or(0, |(byte, _)| byte)
+        }
+
+        fn set_interrupt(&mut self, on: bool) {
+            self.on = on;
+        }
+    }
+
+    fn fetch_all<const SIZE: usize>(
+        receiver: &Receiver<SIZE>,
+        uart: &mut Model,
+        lines: &mut Lines,
+        heard: &mut Vec<Result<String, String>>,
+    ) {
+        while let Some(received) = receiver.fetch(uart) {
+            if received.damaged {
+                lines.damage();
+            }
+            if let Some(line) = lines.push(received.byte) {
+                heard.push(line.map(str::to_owned).map_err(|noise| noise.to_string()));
+            }
+        }
+    }
+
+    /// 115 200 baud without a pause through a frame of 300 ms, which fetches nothing: 3 456 bytes.
+    #[test]
+    fn a_burst_during_a_long_frame_loses_nothing() {
+        let sent: Vec<String> = (0..216).map(|n| format!("show {n:010}")).collect();
+        let bytes: Vec<u8> = sent.join("\r").into_bytes();
+        assert!(bytes.len() >= 3_400, "{}", bytes.len());
+        let receiver = Receiver::<4096>::new();
+        let mut uart = Model::on();
+        for &byte in bytes.iter().chain(b"\r") {
+            uart.arrive(byte, 0);
+            if uart.requests() {
+                receiver.take(&mut uart);
+            }
+        }
+        // The FIFO's time-out.
+        receiver.take(&mut uart);
+        let (mut lines, mut heard) = (Lines::new(), Vec::new());
+        fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
+        let expected: Vec<_> = sent.into_iter().map(Ok).collect();
+        assert_eq!(heard, expected);
+        assert_eq!((receiver.overruns(), receiver.pauses()), (0, 0));
+        assert!(!receiver.has_received());
+    }
+
+    /// Whoever waits while the FIFO is full loses nothing, however small the ring is.
+    #[test]
+    fn a_full_ring_holds_the_sender_up() {
+        let receiver = Receiver::<16>::new();
+        let mut uart = Model::on();
+        uart.waits = true;
+        let mut sent = (0..5_000u32).map(|n| n as u8);
+        let mut expected = (0..5_000u32).map(|n| n as u8);
+        let mut fetched = 0;
+        for round in 0..10_000 {
+            while uart.fifo.len() < usize::from(FIFO)
+                && let Some(byte) = sent.next()
+            {
+                uart.arrive(byte, 0);
+                if uart.requests() {
+                    receiver.take(&mut uart);
+                }
+            }
+            if round % 3 == 0 && uart.on {
+                receiver.take(&mut uart);
+            }
+            for _ in 0..round % 7 {
+                if let Some(received) = receiver.fetch(&mut uart) {
+                    assert_eq!(Some(received.byte), expected.next());
+                    assert!(!received.damaged);
+                    fetched += 1;
+                }
+            }
+        }
+        assert_eq!(fetched, 5_000);
+        assert!(receiver.pauses() > 100, "{}", receiver.pauses());
+        assert!(uart.on, "the interrupt is on again");
+        assert_eq!(receiver.overruns(), 0);
+    }
+
+    /// Whichever bytes a UART loses, no line that they are missing from is heard as a line.
+    #[test]
+    fn a_line_with_a_lost_byte_is_refused_by_name() {
+        let mut random = seeded::generator();
+        let mut refused = 0;
+        for _ in 0..300 {
+            let receiver = Receiver::<64>::new();
+            let mut uart = Model::on();
+            let (mut lines, mut heard) = (Lines::new(), Vec::new());
+            let mut sent = Vec::new();
+            let mut lost = false;
+            for number in 0..40 {
+                let width = random.usize(1..20);
+                let line = format!("{number:0width$}");
+                for &byte in line.as_bytes().iter().chain(b"\n") {
+                    uart.arrive(byte, 0);
+                    lost |= uart.overrun != 0;
+                    // The handler comes late, and the program later.
+                    if random.u8(..12) == 0 {
+                        receiver.take(&mut uart);
+                    }
+                    if random.u8(..40) == 0 {
+                        // Sending reads Line Status, too.
+                        assert!(receiver.can_send(&mut uart));
+                        fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
+                    }
+                }
+                sent.push(line);
+            }
+            let mut rest = sent.iter();
+            for line in &heard {
+                match line {
+                    // Whole, and in order.
+                    Ok(line) => assert!(rest.any(|sent| sent == line), "'{line}' was not sent"),
+                    Err(why) => {
+                        assert_eq!(
+                            why,
+                            "a line with bytes that were lost or damaged on the wire"
+                        );
+                        refused += 1;
+                    }
+                }
+            }
+            if receiver.overruns() == 0 && uart.overrun == 0 {
+                assert!(!lost);
+                assert!(heard.iter().all(Result::is_ok));
+            }
+        }
+        assert!(refused > 100, "{refused}");
+    }
+
+    #[test]
+    fn a_damaged_byte_costs_its_line_whoever_reads_the_status() {
+        for sender_reads_first in [false, true] {
+            for error in [0x04, 0x08, 0x10] {
+                let receiver = Receiver::<64>::new();
+                let mut uart = Model::on();
+                for &byte in b"one\ntwo\nthree\n" {
+                    uart.arrive(byte, if byte == b'w' { error } else { 0 });
+                    if sender_reads_first {
+                        receiver.can_send(&mut uart);
+                    }
+                    receiver.take(&mut uart);
+                }
+                let (mut lines, mut heard) = (Lines::new(), Vec::new());
+                fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
+                let lost = "a line with bytes that were lost or damaged on the wire";
+                let expected = [Ok("one"), Err(lost), Ok("three")];
+                let heard: Vec<_> = heard
+                    .iter()
+                    .map(|line| line.as_deref().map_err(String::as_str))
+                    .collect();
+                assert_eq!(heard, expected);
+                assert_eq!((receiver.damaged(), receiver.overruns()), (1, 0));
+            }
+        }
+    }
+
+    #[test]
+    fn a_port_with_nothing_behind_it_gives_nothing() {
+        struct Nothing;
+        impl Uart for Nothing {
+            fn line_status(&mut self) -> u8 {
+                NOTHING
+            }
+            fn data(&mut self) -> u8 {
+                unreachable!("it has no byte")
+            }
+            fn set_interrupt(&mut self, _: bool) {
+                unreachable!("the ring is empty")
+            }
+        }
+        let receiver = Receiver::<16>::new();
+        receiver.take(&mut Nothing);
+        assert!(!receiver.has_received());
+        assert_eq!((receiver.overruns(), receiver.damaged()), (0, 0));
+    }
+}
