@@ -3,9 +3,6 @@
 //! Each test boots a machine of its own, so that one failure leaves the others alone; set-up is
 //! one locked step that all of them take.
 
-mod judged;
-mod ready;
-
 use std::fs::File;
 use std::io::{BufReader, Write};
 use std::os::unix::net::UnixStream;
@@ -18,10 +15,11 @@ use std::time::{Duration, Instant};
 
 use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::machine::{Machine, Verdict};
-use judged::{Judged, verdict};
 use link::{Action, Change, Command, Content, Fault, Picture};
 use modex::registers::MODE_X;
-use ready::{READY, config};
+
+use crate::judged::{Judged, verdict};
+use crate::ready::{READY, config};
 
 fn boot() -> Machine {
     Machine::boot(&config()).expect("boots")

@@ -8,6 +8,8 @@ use crystal_ball::machine::{Config, Machine};
 use crystal_ball::setup::{self, Options};
 use link::{Command, Content, Picture};
 
+use crate::ready;
+
 /// How long the running show is watched.
 const WATCHED: Duration = Duration::from_secs(60);
 /// Boots that the times are the median of.
@@ -17,7 +19,7 @@ const BOOTS: usize = 5;
 #[ignore = "measures for five minutes; run it alone, by `cargo figures`"]
 fn figures() {
     let options = Options::default();
-    let ready = setup::ready(&options).expect("the set-up");
+    let ready = ready::with(&options);
     let config = Config::new(&ready);
     let goldens = golden::find(&golden::folder()).expect("golden frames");
     let mut memory = card::memory();

@@ -4,8 +4,6 @@
 //! Findings are collected over all goldens before the verdict, and a report shows them
 //! (`target/crystal-ball/golden/report.html`).
 
-mod ready;
-
 use std::mem::discriminant;
 use std::path::{Path, PathBuf};
 use std::process::Command as Process;
@@ -17,8 +15,9 @@ use crystal_ball::golden::{self, Findings, Golden, Transfer};
 use crystal_ball::machine::Machine;
 use emulator::Access;
 use link::{Command, Content, Picture};
-use ready::{READY, config};
 use tempfile::TempDir;
+
+use crate::ready::{READY, config};
 
 fn goldens() -> Vec<Golden> {
     golden::find(&golden::folder()).expect("the golden frames")

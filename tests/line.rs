@@ -3,9 +3,6 @@
 //! QEMU is real and so is the image. QEMU is started by a small script that gives it another
 //! socket for COM1; what comes there is passed on to the program, altered.
 
-mod judged;
-mod ready;
-
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::Shutdown;
 use std::os::unix::fs::PermissionsExt;
@@ -18,10 +15,11 @@ use std::time::Duration;
 use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::dump::Dump;
 use crystal_ball::machine::{Config, Machine, Verdict};
-use judged::{Judged, verdict};
 use link::{Command, Content, Picture};
-use ready::{READY, config};
 use tempfile::TempDir;
+
+use crate::judged::{Judged, verdict};
+use crate::ready::{READY, config};
 
 /// What becomes of a line of the kernel's, its end included.
 type Alter = Box<dyn FnMut(&[u8]) -> Vec<u8> + Send>;

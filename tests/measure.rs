@@ -1,10 +1,13 @@
 //! The measuring kernel in real QEMU, and what is counted beside it.
 
 use std::fmt::Write;
+use std::sync::LazyLock;
 
 use cost::Work;
 use crystal_ball::measure::{self, Config, Cpu, Emulated, Measured, Memories};
 use texmap::{Mapper, Order};
+
+use crate::ready::READY;
 
 /// The mappers of the names.
 fn mappers(names: &[&str]) -> Vec<Mapper> {
@@ -16,6 +19,7 @@ fn mappers(names: &[&str]) -> Vec<Mapper> {
 /// pixels are as many without it, and that QEMU and the emulated card hold the same pictures.
 #[test]
 fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
+    LazyLock::force(&READY);
     let names = ["row-passes", "affine", "exact"];
     let measured = measure::run(&Config {
         cpus: vec![Cpu::Baseline],
@@ -120,10 +124,11 @@ fn counting_changes_no_byte() {
     }
 }
 
-/// Everything, as a table: `cargo test --release --test measure -- --ignored --nocapture`.
+/// Everything, as a table: `cargo test --release --test qemu -- --ignored --exact --nocapture measure::figures`.
 #[test]
 #[ignore = "measures for minutes; run it alone"]
 fn figures() {
+    LazyLock::force(&READY);
     let measured = measure::run(&Config::default()).unwrap();
     println!("{}", table(&measured));
 }

@@ -8,9 +8,11 @@ use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::model::Model;
 use crystal_ball::screen::Screen;
-use crystal_ball::setup::{self, Options};
+use crystal_ball::setup::Options;
 use link::{Command, Content, Picture, Setting, Word};
 use tempfile::TempDir;
+
+use crate::ready;
 
 /// A pyramid on a star: two objects, a concave face, and faces with and without texture coordinates,
 /// some of them beyond the texture's border.
@@ -53,7 +55,7 @@ fn boot(ramdisk: Vec<u8>, pack: Option<u32>) -> Machine {
         ramdisk: Some(ramdisk),
         ..Options::default()
     };
-    let ready = setup::ready(&options).expect("the set-up failed");
+    let ready = ready::with(&options);
     let config = Config {
         pack,
         ..Config::new(&ready)

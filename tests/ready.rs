@@ -1,12 +1,30 @@
-//! The set-up, once for all tests of a program.
+//! The set-up, once for all tests.
 
+use std::io::Write;
 use std::sync::LazyLock;
 
 use crystal_ball::machine::Config;
 use crystal_ball::setup::{self, Options, Ready};
 
-pub static READY: LazyLock<Ready> =
-    LazyLock::new(|| setup::ready(&Options::default()).expect("the set-up failed"));
+/// What every boot needs.
+pub static READY: LazyLock<Ready> = LazyLock::new(|| with(&Options::default()));
+
+/// The set-up with these options.
+///
+/// Where it fails, no test of this program can pass, so the program ends at once: the reason is then
+/// the last thing on the screen, and not one of fifty failures.
+pub fn with(options: &Options) -> Ready {
+    setup::ready(options).unwrap_or_else(|error| {
+        // Not by `eprintln!`, which libtest keeps until the test has ended.
+        let _ = writeln!(
+            std::io::stderr(),
+            "\n\nerror: these tests boot a machine, and the set-up for that failed: {error:#}\n\n\
+             `cargo run -- doctor` lists what is there and what is missing. \
+             `cargo test --no-fail-fast` runs the tests that need none of it.\n"
+        );
+        std::process::exit(1);
+    })
+}
 
 /// The image on QEMU's standard adapter, without a window.
 pub fn config() -> Config {

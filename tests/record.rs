@@ -7,12 +7,8 @@ use std::sync::LazyLock;
 
 use crystal_ball::diff::Subject;
 use crystal_ball::indexed::{Indexed, widen};
-use crystal_ball::setup::{self, Options};
 
-/// The set-up, once: the program then finds it done.
-static READY: LazyLock<()> = LazyLock::new(|| {
-    setup::ready(&Options::default()).expect("the set-up failed");
-});
+use crate::ready::READY;
 
 /// The program's exit code, standard output and standard error.
 fn crystal_ball(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {

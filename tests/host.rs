@@ -1,0 +1,10 @@
+//! The tests of the host program that need no QEMU, all in one program: it is linked once.
+//!
+//! `cargo test --test host diff::` runs those of one module.
+
+mod diff;
+mod fuzz;
+mod gaps;
+mod mutants;
+mod pictures;
+mod trade;
