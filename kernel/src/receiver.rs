@@ -181,6 +181,8 @@ mod tests {
         on: bool,
         /// Who sends waits while the FIFO is full, as QEMU does.
         waits: bool,
+        /// The transmitter is busy.
+        busy: bool,
     }
 
     impl Model {
@@ -213,7 +215,8 @@ mod tests {
             let next = self.fifo.front_mut();
             let ready = if next.is_some() { DATA_READY } else { 0 };
             let errors = next.map_or(0, |(_, errors)| std::mem::take(errors));
-            ready | errors | std::mem::take(&mut self.overrun) | TRANSMITTER_READY
+            let sending = if self.busy { 0 } else { TRANSMITTER_READY };
+            ready | errors | std::mem::take(&mut self.overrun) | sending
         }
 
         fn data(&mut self) -> u8 {
@@ -298,6 +301,41 @@ mod tests {
         assert!(receiver.pauses() > 100, "{}", receiver.pauses());
         assert!(uart.on, "the interrupt is on again");
         assert_eq!(receiver.overruns(), 0);
+    }
+
+    #[test]
+    fn the_interrupt_is_off_from_a_full_ring_to_a_half_empty_one() {
+        let receiver = Receiver::<16>::new();
+        let mut uart = Model::on();
+        for byte in 0..16 {
+            uart.arrive(byte, 0);
+            receiver.take(&mut uart);
+            assert_eq!(uart.on, byte < 15, "after {byte}");
+        }
+        for byte in 0..16 {
+            assert_eq!(receiver.fetch(&mut uart).map(|r| r.byte), Some(byte));
+            assert_eq!(uart.on, byte >= 7, "after {byte}");
+        }
+        // Nobody else switches it.
+        uart.on = false;
+        assert_eq!(receiver.fetch(&mut uart), None);
+        assert!(!uart.on);
+        assert_eq!(receiver.pauses(), 1);
+    }
+
+    #[test]
+    fn a_byte_is_announced_and_a_busy_transmitter_is_waited_for() {
+        let receiver = Receiver::<16>::new();
+        let mut uart = Model::on();
+        for busy in [true, false] {
+            uart.busy = busy;
+            uart.arrive(7, 0);
+            assert_eq!(receiver.can_send(&mut uart), !busy);
+            assert!(!receiver.has_received());
+            receiver.take(&mut uart);
+            assert!(receiver.has_received());
+            assert!(receiver.fetch(&mut uart).is_some());
+        }
     }
 
     /// Whichever bytes a UART loses, no line that they are missing from is heard as a line.
