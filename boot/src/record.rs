@@ -14,7 +14,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
-use link::{Command, Content, Picture};
+use link::{Command, Content, Picture, TICKS_PER_SECOND};
 
 use crate::card::{Card, Emulated};
 use crate::frames::range;
@@ -144,7 +144,7 @@ impl Options {
 
 /// So many ticks in 1/100 s, rounded down.
 fn centiseconds(ticks: u64) -> u64 {
-    ticks * 100 / 60
+    ticks * 100 / u64::from(TICKS_PER_SECOND)
 }
 
 /// What QEMU's card holds when it shows `picture`.

@@ -69,6 +69,9 @@ pub use command::{Command, CommandError, Content, Fault, Motion, Picture, Settin
 pub use frame::{Checksum, FrameError, unframe, write_line};
 pub use lines::{Lines, Noise};
 
+/// Ticks in a second of the machine's time: a frame is drawn for each tick, as far as the machine
+/// keeps up.
+pub const TICKS_PER_SECOND: u32 = 60;
 /// The protocol's version, in the kernel's first line.
 pub const PROTOCOL: u32 = 6;
 /// Longest line in bytes, its checksum included, its end not: 320 pixels of a dump with their

@@ -11,7 +11,7 @@
 use core::array;
 use core::fmt::{self, Write};
 
-use link::Action;
+use link::{Action, TICKS_PER_SECOND};
 use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH};
 use scene::font;
 use scene::motion::Motion;
@@ -20,8 +20,6 @@ use texmap::{Mapper, Order};
 use crate::split::{self, Split};
 use crate::{KEYS, lower_mark};
 
-/// A tick is a sixtieth of a second.
-const TICKS_A_SECOND: u32 = 60;
 /// Ticks between one writing of the figures and the next.
 const RENEWAL: u32 = 30;
 /// Ticks that a hint stays.
@@ -338,7 +336,7 @@ impl<'a> Overlay<'a> {
             } = self.window;
             // Not of pictures that were not shown: the show may just have begun.
             if pictures > 0 && ticks < 100 * RENEWAL {
-                let tenths = pictures * 10 * TICKS_A_SECOND / ticks;
+                let tenths = pictures * 10 * TICKS_PER_SECOND / ticks;
                 self.pace = Some((tenths, (micros / u64::from(pictures)) as u32));
             }
             self.window = Window {
@@ -495,10 +493,10 @@ impl<'a> Overlay<'a> {
 fn moved(motion: Option<Motion>, pace: Option<(u32, u32)>) -> Option<(u32, Option<(u32, u32)>)> {
     let (motion, (tenths, _)) = motion.zip(pace)?;
     // Ticks a picture, 16.16.
-    let ticks = ((10 * TICKS_A_SECOND) << 16).checked_div(tenths)?;
+    let ticks = ((10 * TICKS_PER_SECOND) << 16).checked_div(tenths)?;
     let pixels = (u64::from(motion.pixels) * u64::from(ticks)) >> 16;
     let pixels = u32::try_from(pixels).unwrap_or(u32::MAX);
-    Some((pixels, motion.sweet_spot(ticks, TICKS_A_SECOND)))
+    Some((pixels, motion.sweet_spot(ticks, TICKS_PER_SECOND)))
 }
 
 /// A number with 16 fraction bits, cut to hundredths.

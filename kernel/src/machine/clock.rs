@@ -3,6 +3,8 @@
 use core::arch::asm;
 use core::arch::x86_64::{__cpuid, __cpuid_count};
 
+use link::TICKS_PER_SECOND;
+
 /// Ticks since the machine's start: the host's own under plain TCG, instructions carried out under
 /// `-icount shift=0`. The compiler moves no memory access across it.
 pub fn now() -> u64 {
@@ -35,7 +37,7 @@ impl Stopwatch {
         let now = now();
         let ticks = tick.wrapping_sub(self.tick);
         let counted = now.saturating_sub(self.began).max(1);
-        let passed = u128::from(ticks) * 1_000_000 / u128::from(super::timer::RATE);
+        let passed = u128::from(ticks) * 1_000_000 / u128::from(TICKS_PER_SECOND);
         let micros = u128::from(now.saturating_sub(since)) * passed / u128::from(counted);
         micros.try_into().unwrap_or(u32::MAX)
     }

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use link::{ACKNOWLEDGE, CANCEL, Reception};
+use link::{ACKNOWLEDGE, CANCEL, Reception, TICKS_PER_SECOND};
 use spin::Mutex;
 use uart_16550::backend::PioBackend;
 use uart_16550::spec::registers::{FifoTriggerLevel, IER};
@@ -151,9 +151,9 @@ pub struct Unlocked {
     clock: timer::Countdown,
 }
 
-/// Timer periods that a whole report may wait for its host: 5 s at 60 Hz, and 16 s if the failure
+/// Timer periods that a whole report may wait for its host: 5 s of ticks, and 16 s if the failure
 /// came before the timer was set.
-const PATIENCE: u32 = 300;
+const PATIENCE: u32 = 5 * TICKS_PER_SECOND;
 
 impl Unlocked {
     /// Takes the port over; what the lock's holder had begun of a line is cancelled.

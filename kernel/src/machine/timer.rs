@@ -1,17 +1,17 @@
-//! Ticks: 1/60 s of machine time, from the programmable interval timer.
+//! Ticks of [`TICKS_PER_SECOND`], from the programmable interval timer.
 //!
 //! The VGA's retrace can't pace anything here: QEMU toggles it at every read.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use link::TICKS_PER_SECOND;
+
 use super::ports;
 
 /// The timer's input clock in Hz (14.31818 MHz / 12).
 const CLOCK: u32 = 1_193_182;
-/// Ticks a second.
-pub const RATE: u32 = 60;
 /// 60.0011 Hz.
-const DIVISOR: u16 = (CLOCK / RATE) as u16;
+const DIVISOR: u16 = (CLOCK / TICKS_PER_SECOND) as u16;
 
 const CHANNEL_0: u16 = 0x40;
 const COMMAND: u16 = 0x43;
