@@ -31,6 +31,7 @@ const ATTRIBUTE: &str = "tests/emulator/src/attribute.rs";
 const CRTC: &str = "tests/emulator/src/crtc.rs";
 const DAC: &str = "tests/emulator/src/dac.rs";
 const MEMORY: &str = "tests/emulator/src/memory.rs";
+const MONITOR: &str = "tests/emulator/src/monitor.rs";
 const SCANOUT: &str = "tests/emulator/src/scanout.rs";
 const SEQUENCER: &str = "tests/emulator/src/sequencer.rs";
 const ADAPTIVE: &str = "kernel/texmap/src/adaptive.rs";
@@ -76,15 +77,19 @@ const MUTANTS: &[Mutant] = &[
         "write(&mut self.bus, SEQUENCER, MAP_MASK, ALL_PLANES);",
         "write(&mut self.bus, SEQUENCER, MAP_MASK, 1);"),
     mutant("wait for the retrace skipped", DRIVER,
-        "self.bus.purpose(Purpose::Flip);\n        self.wait_for_retrace();",
-        "self.bus.purpose(Purpose::Flip);"),
+        "self.wait(\"vertical retrace\", |status| status & VERTICAL_RETRACE != 0)", "Ok(())"),
+    mutant("the display not seen before the retrace", DRIVER,
+        "self.wait(\"display\", |status| status & DISPLAY_DISABLED == 0)?;", ""),
     mutant("a page that may be on the screen not waited for", DRIVER,
         "if self.visible[self.back] {", "if false {"),
-    mutant("flip written at any time", DRIVER,
-        "self.bus.purpose(Purpose::Flip);\n        self.wait_for_display();",
-        "self.bus.purpose(Purpose::Flip);"),
+    mutant("flip not waited for", DRIVER,
+        "if let Err(stuck) = self.wait_for_frame() {", "if let Err(stuck) = Ok::<(), Stuck>(()) {"),
+    mutant("planes not proved", DRIVER,
+        "check_planes(bus)?;", ""),
+    mutant("a Cirrus taken for granted", DRIVER,
+        "if !unlock_cirrus(bus) {", "if !unlock_cirrus(bus) && false {"),
     mutant("mode set waits for no frame", DRIVER,
-        "        self.wait_for_display();\n        self.wait_for_retrace();\n", ""),
+        "self.wait_for_frame().map_err(SetError::Beam)?;", ""),
     mutant("two pages, not three", DRIVER,
         "self.back = (self.back + 1) % PAGES;", "self.back = (self.back + 1) % 2;"),
     mutant("DISPI left enabled", DRIVER,
@@ -134,10 +139,14 @@ const MUTANTS: &[Mutant] = &[
     mutant("CRTC protect told, and the write taken", CRTC,
         "            // The chip drops the write, but for CR7 bit 4.\n",
         "            self.registers[usize::from(index)] = Some(value);\n"),
-    mutant("off by one in scan lines", CRTC,
-        "ninth_and_tenth(1, 6)) + 1;", "ninth_and_tenth(1, 6));"),
-    mutant("off by one in the lines of a frame", CRTC,
-        "ninth_and_tenth(0, 5)) + 2;", "ninth_and_tenth(0, 5)) + 1;"),
+    mutant("off by one in scan lines", MONITOR,
+        "bit(0x07, 6, 9)) + 1,", "bit(0x07, 6, 9)),"),
+    mutant("off by one in the lines of a frame", MONITOR,
+        "bit(0x07, 5, 9)) + 2,", "bit(0x07, 5, 9)) + 1,"),
+    mutant("times not compared", MONITOR,
+        "given.2 != needed.2", "false"),
+    mutant("time stands still", CRTC,
+        "self.ahead -= clocks;", ""),
     mutant("8-bit DAC", DAC,
         "Some(value & 0x3F);
         self.write = Some(next(entry, part));
@@ -167,10 +176,10 @@ const MUTANTS: &[Mutant] = &[
         "Some(UNCHAINED) => Ok(()),", "Some(_) => Ok(()),"),
     mutant("reset of the sequencer not seen", SEQUENCER,
         "!= Some(RUNNING) {", "== None {"),
-    mutant("store to a page that is seen not noticed", VGA,
-        "(self.crtc.shown_address(), \"is on the screen\"),", ""),
-    mutant("store to a page that will be seen not noticed", VGA,
-        "(self.crtc.start_address(), \"will be on the screen\"),", ""),
+    mutant("store to a page that is seen not noticed", CRTC,
+        "[old, self.start_address()]", "[None, self.start_address()]"),
+    mutant("store to a page that will be seen not noticed", CRTC,
+        "[old, self.start_address()]", "[old, None]"),
     mutant("DISPI not noticed", VGA,
         "dispi: true,", "dispi: false,"),
     mutant("faults forgotten with the card", VGA,

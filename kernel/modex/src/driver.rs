@@ -49,6 +49,27 @@ pub enum SetError {
         /// The value that the load through Read Map returned.
         actual: u8,
     },
+    /// Input Status 1 never had a state that each frame has.
+    Beam(Stuck),
+}
+
+/// A state of the beam that Input Status 1 does not report: `display` or `vertical retrace`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stuck {
+    /// The state that was waited for.
+    pub expected: &'static str,
+    /// The last value that Input Status 1 read.
+    pub actual: u8,
+}
+
+impl fmt::Display for Stuck {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { expected, actual } = self;
+        write!(
+            f,
+            "the card reports no {expected} in {POLLS} reads of Input Status 1, which reads {actual:02X}"
+        )
+    }
 }
 
 impl fmt::Display for SetError {
@@ -73,6 +94,7 @@ impl fmt::Display for SetError {
                 "the window at A0000h is not planar: at offset {at:04X} plane {plane} reads \
                  {actual:02X} after {expected:02X} was stored"
             ),
+            Self::Beam(stuck) => stuck.fmt(f),
         }
     }
 }
@@ -160,9 +182,25 @@ impl Drawn {
 
 /// The card in Mode X, with its three pages.
 ///
-/// Pages rotate. A page is drawn on only when the card can't be showing it any more: the CRTC
-/// takes a new start address over at the retrace, so until a retrace was seen both the old page
-/// and the new one may be on the screen.
+/// Pages rotate. A page is drawn on only when the card can't be showing it any more.
+///
+/// # Why nothing tears
+///
+/// The pages share the low byte of their start address, so a flip is one write of one byte: at any
+/// moment the CRTC has one page's address or the other's. It takes the address over once a frame, at
+/// a moment that differs from card to card, but lies after the last line that is shown and before
+/// the next frame's first line.
+///
+/// [`ModeX::flip`] writes at any time. [`ModeX::settle`] reads Input Status 1, all of it after that
+/// write: first until the card displays (at a time A), then until it is in the vertical retrace (at a
+/// later time B). The end of a frame's display lies between A and B. The take-over that follows this
+/// end comes after A, so after the write, and takes the new page. No line of the old page is shown
+/// between the end of the display and that take-over, nor ever after. So from B on the old page is free.
+///
+/// The argument needs no bound on any time: an interrupt between two accesses only makes A or B later.
+/// The other order, to see the card display and then to write, does need one: the display may be seen
+/// on its last line, and the write may come after the take-over, while the retrace that is then
+/// waited for has already begun. The old page would be drawn on while it is shown for one more frame.
 #[derive(Debug)]
 pub struct ModeX<B> {
     bus: B,
@@ -171,8 +209,8 @@ pub struct ModeX<B> {
     front: usize,
     /// The page that is or was last drawn on.
     back: usize,
-    /// Pages that may be on the screen: `front`, and those flipped away from since a retrace
-    /// was last seen.
+    /// Pages that may be on the screen: `front`, and those flipped away from since the last
+    /// [`ModeX::settle`].
     visible: [bool; PAGES],
 }
 
@@ -197,7 +235,8 @@ impl<B: Bus> ModeX<B> {
     /// all four planes; page 0 is shown. What follows depends on nothing that was before.
     ///
     /// # Errors
-    /// The first register that reads back wrong, or the first byte of a plane that does.
+    /// The first register that reads back wrong, or the first byte of a plane that does; a beam that
+    /// does not move.
     pub fn reset(&mut self, palette: &Palette) -> Result<(), SetError> {
         let bus = &mut self.bus;
         bus.purpose(Purpose::Setup);
@@ -209,10 +248,9 @@ impl<B: Bus> ModeX<B> {
         for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
             bus.store64(at as u16, 0);
         }
-        // Until a retrace the CRTC shows from the start address that was there before, and that is
-        // a page which may be drawn on next.
-        self.wait_for_display();
-        self.wait_for_retrace();
+        // Until then the CRTC shows from the start address that was there before, and that is a page
+        // which may be drawn on next.
+        self.wait_for_frame().map_err(SetError::Beam)?;
         let bus = &mut self.bus;
         let clocking = MODE_X.sequencer[usize::from(CLOCKING_MODE)];
         write(bus, SEQUENCER, CLOCKING_MODE, clocking);
@@ -223,7 +261,7 @@ impl<B: Bus> ModeX<B> {
     }
 
     /// The page after the one drawn last, on its bare background: `background[y]` is the
-    /// colour of line y. Waits for a retrace first if that page may still be on the screen.
+    /// colour of line y. Waits as [`ModeX::settle`] first if that page may still be on the screen.
     ///
     /// Only what the page was drawn on is restored, in wide stores to all planes at once.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) -> Canvas<'_, B> {
@@ -271,24 +309,30 @@ impl<B: Bus> ModeX<B> {
         self.drawn[self.back] = *offscreen.drawn();
     }
 
-    /// Shows the page drawn last, from the next retrace on.
-    ///
-    /// The start address is written while the card displays, so that the retrace which takes it
-    /// over is a whole frame's work away and can't split the write from its effect. The three
-    /// pages share the low byte of their start address: one write flips.
+    /// Shows the page drawn last, from the next frame on.
     pub fn flip(&mut self) {
+        const {
+            assert!(
+                PAGE_BYTES.is_multiple_of(256),
+                "a flip is one write of one byte"
+            )
+        }
         self.bus.purpose(Purpose::Flip);
-        self.wait_for_display();
         let high = (page_start(self.back) >> 8) as u8;
         write(&mut self.bus, CRTC, START_ADDRESS_HIGH, high);
         self.front = self.back;
         self.visible[self.front] = true;
     }
 
-    /// Waits until the last flip holds: the page flipped to, and no other, is on the screen.
+    /// Waits until the last flip holds: the page flipped to, and no other, will be shown.
+    ///
+    /// # Panics
+    /// If the card reports no display or no retrace in some seconds.
     pub fn settle(&mut self) {
         self.bus.purpose(Purpose::Flip);
-        self.wait_for_retrace();
+        if let Err(stuck) = self.wait_for_frame() {
+            panic!("{stuck}");
+        }
         self.visible = [false; PAGES];
         self.visible[self.front] = true;
     }
@@ -336,21 +380,21 @@ impl<B: Bus> ModeX<B> {
         &mut self.bus
     }
 
-    fn wait_for_display(&mut self) {
-        self.wait("display", |status| status & DISPLAY_DISABLED == 0);
+    /// Waits until a start address that was written before is taken over: see [`ModeX`].
+    fn wait_for_frame(&mut self) -> Result<(), Stuck> {
+        self.wait("display", |status| status & DISPLAY_DISABLED == 0)?;
+        self.wait("vertical retrace", |status| status & VERTICAL_RETRACE != 0)
     }
 
-    fn wait_for_retrace(&mut self) {
-        self.wait("vertical retrace", |status| status & VERTICAL_RETRACE != 0);
-    }
-
-    fn wait(&mut self, what: &str, holds: impl Fn(u8) -> bool) {
+    fn wait(&mut self, expected: &'static str, holds: impl Fn(u8) -> bool) -> Result<(), Stuck> {
+        let mut actual = 0;
         for _ in 0..POLLS {
-            if holds(self.bus.in8(INPUT_STATUS_1)) {
-                return;
+            actual = self.bus.in8(INPUT_STATUS_1);
+            if holds(actual) {
+                return Ok(());
             }
         }
-        panic!("the card never reported {what} in {POLLS} reads of Input Status 1");
+        Err(Stuck { expected, actual })
     }
 }
 
@@ -447,7 +491,7 @@ fn write<B: Bus>(bus: &mut B, port: u16, index: u8, value: u8) {
 ///
 /// While DISPI is enabled QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card
 /// has no DISPI (its ID reads no B0Cx); while its SR7 bit 0 is set, stores go to linear memory
-/// past Map Mask. Any other card is left alone.
+/// past Map Mask. Of any other card no register outside the plain VGA keeps another value than it had.
 fn leave_linear_mode<B: Bus>(bus: &mut B) {
     bus.out16(DISPI_INDEX, DISPI_ID);
     if bus.in16(DISPI_DATA) & 0xFFF0 == 0xB0C0 {
@@ -455,19 +499,40 @@ fn leave_linear_mode<B: Bus>(bus: &mut B) {
         bus.out16(DISPI_DATA, 0);
         return;
     }
-    write(bus, SEQUENCER, CIRRUS_UNLOCK, CIRRUS_KEY);
-    bus.out8(SEQUENCER, CIRRUS_UNLOCK);
-    if bus.in8(SEQUENCER + 1) == CIRRUS_KEY {
-        for (port, index) in CIRRUS_EXTENSIONS {
-            write(bus, port, index, 0);
-        }
-        // The card's DAC has a register of its own behind PEL Mask: it opens after four reads,
-        // and holds the colour depth of the linear mode.
-        for _ in 0..4 {
-            bus.in8(PEL_MASK);
-        }
-        bus.out8(PEL_MASK, 0);
+    if !unlock_cirrus(bus) {
+        return;
     }
+    for (port, index) in CIRRUS_EXTENSIONS {
+        write(bus, port, index, 0);
+    }
+    // The card's DAC has a register of its own behind PEL Mask: it opens after four reads, and
+    // holds the colour depth of the linear mode.
+    for _ in 0..4 {
+        bus.in8(PEL_MASK);
+    }
+    bus.out8(PEL_MASK, 0);
+}
+
+/// Unlocks a Cirrus Logic card's own registers. Returns false for any other card, whose SR6 then has
+/// the value that it had.
+///
+/// A Cirrus answers to a key with a word that was not written: after any value but the key SR6 reads
+/// [`CIRRUS_LOCKED`], and after the key it reads the key. A register that just holds what is written
+/// fails the first question, and one that holds nothing fails both.
+fn unlock_cirrus<B: Bus>(bus: &mut B) -> bool {
+    let read = |bus: &mut B| {
+        bus.out8(SEQUENCER, CIRRUS_UNLOCK);
+        bus.in8(SEQUENCER + 1)
+    };
+    let before = read(bus);
+    for (written, answer) in [(0, CIRRUS_LOCKED), (CIRRUS_KEY, CIRRUS_KEY)] {
+        write(bus, SEQUENCER, CIRRUS_UNLOCK, written);
+        if read(bus) != answer {
+            write(bus, SEQUENCER, CIRRUS_UNLOCK, before);
+            return false;
+        }
+    }
+    true
 }
 
 /// Writes every register of the mode, the screen left off.

@@ -34,7 +34,7 @@ mod window;
 pub use bus::{Bus, Purpose};
 pub use column::{Column, Destination, Lane, Line};
 pub use count::{Counted, Counts, Tally};
-pub use driver::{Canvas, ModeX, Palette, Rgb6, SetError};
+pub use driver::{Canvas, ModeX, Palette, Rgb6, SetError, Stuck};
 pub use offscreen::Offscreen;
 pub use planar::PlanarBuffer;
 pub use window::Window;

@@ -37,10 +37,12 @@ pub const DISPI_ID: u16 = 0;
 /// DISPI index 4: enable.
 pub const DISPI_ENABLE: u16 = 4;
 
-/// SR6 of a Cirrus Logic card: unlocks its extensions, and reads back [`CIRRUS_KEY`] then.
+/// SR6 of a Cirrus Logic card: unlocks its extensions, and says whether they are.
 pub const CIRRUS_UNLOCK: u8 = 0x06;
-/// What unlocks them.
+/// SR6 after this value was written: the extensions are unlocked.
 pub const CIRRUS_KEY: u8 = 0x12;
+/// SR6 after any other value was written: the extensions are locked.
+pub const CIRRUS_LOCKED: u8 = 0x0F;
 /// A Cirrus Logic card's own registers as a plain VGA mode needs them, zero all of them: SR7
 /// Extended Sequencer Mode, GR9 and GRA (banks), GRB Mode Extensions, CR1A, CR1B, CR1D.
 pub const CIRRUS_EXTENSIONS: [(u16, u8); 7] = [

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use modex::registers::*;
 use modex::{
     Bus, Counted, Destination, HEIGHT, Lane, Line, ModeX, Offscreen, PAGE_BYTES, PAGES,
-    PLANE_BYTES, PlanarBuffer, STRIDE, SetError, Tally, WIDTH, Window,
+    PLANE_BYTES, PlanarBuffer, STRIDE, SetError, Stuck, Tally, WIDTH, Window,
 };
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,7 +31,22 @@ struct Recorder {
     /// A register that does not hold what is written.
     stuck: Option<(u16, u8)>,
     dispi: bool,
+    /// What is behind SR6.
+    sr6: Sr6,
     window: Behind,
+}
+
+/// What is behind SR6 of a card.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Sr6 {
+    /// A Cirrus Logic card's lock: it reads 12h after 12h, and 0Fh after any other value.
+    Lock,
+    /// A register of eight bits.
+    Register,
+    /// A register whose upper four bits are not wired.
+    HalfRegister,
+    /// No register: it reads this value.
+    Fixed(u8),
 }
 
 /// What the window at A0000h shows.
@@ -54,12 +69,13 @@ impl Recorder {
         Self {
             log: Vec::new(),
             index: HashMap::new(),
-            registers: HashMap::new(),
+            registers: HashMap::from([((SEQUENCER, 6), 0xFF)]),
             attribute_data: false,
             planes: vec![vec![0xEE; PLANE_BYTES]; 4],
             status: vec![VERTICAL_RETRACE | DISPLAY_DISABLED, 0],
             stuck: None,
             dispi: true,
+            sr6: Sr6::Fixed(0xFF),
             window: Behind::Planes,
         }
     }
@@ -89,6 +105,12 @@ impl Recorder {
     }
 
     fn write(&mut self, port: u16, index: u8, value: u8) {
+        let value = match (port, index, self.sr6) {
+            (SEQUENCER, 6, Sr6::Lock) if value != 0x12 => 0x0F,
+            (SEQUENCER, 6, Sr6::HalfRegister) => value & 0x0F,
+            (SEQUENCER, 6, Sr6::Fixed(fixed)) => fixed,
+            _ => value,
+        };
         if self.stuck != Some((port, index)) {
             self.registers.insert((port, index), value);
         }
@@ -209,20 +231,44 @@ fn the_mode_is_set_in_an_order_that_every_card_takes() {
     }
 }
 
+/// A mode set on a card without DISPI, whose SR6 read `before` until then.
+fn set_without_dispi(sr6: Sr6, before: u8) -> Recorder {
+    let mut recorder = Recorder::new();
+    (recorder.dispi, recorder.sr6) = (false, sr6);
+    recorder.registers.insert((SEQUENCER, 6), before);
+    ModeX::set(&mut recorder, &BLACK).unwrap();
+    assert!(!recorder.log.contains(&Access::Out16(DISPI_DATA, 0)));
+    recorder
+}
+
 #[test]
-fn a_card_without_dispi_leaves_its_own_linear_mode() {
-    let mut cirrus = Recorder::new();
-    cirrus.dispi = false;
-    ModeX::set(&mut cirrus, &BLACK).unwrap();
-    assert!(!cirrus.log.contains(&Access::Out16(DISPI_DATA, 0)));
-    assert_eq!(cirrus.registers[&(SEQUENCER, 7)], 0);
-    assert_eq!(cirrus.registers[&(CRTC, 0x1B)], 0);
-    // A card that does not take the key is not a Cirrus, and keeps its registers.
-    let mut other = Recorder::new();
-    other.dispi = false;
-    other.stuck = Some((SEQUENCER, CIRRUS_UNLOCK));
-    ModeX::set(&mut other, &BLACK).unwrap();
-    assert!(!other.registers.contains_key(&(SEQUENCER, 7)));
+fn a_cirrus_leaves_its_own_linear_mode() {
+    for before in [0x0F, 0x12] {
+        let cirrus = set_without_dispi(Sr6::Lock, before);
+        for extension in CIRRUS_EXTENSIONS {
+            assert_eq!(cirrus.registers[&extension], 0, "{extension:?}");
+        }
+    }
+}
+
+/// Whatever a card has at SR6 that is no Cirrus: nothing outside the VGA has another value after
+/// the mode set.
+#[test]
+fn any_other_card_is_left_as_it_was() {
+    let kinds = [Sr6::Register, Sr6::HalfRegister].map(|kind| [(kind, 0x00), (kind, 0x0A)]);
+    let fixed = [0xFF, 0x00, 0x0F, 0x12].map(|value| (Sr6::Fixed(value), value));
+    // A register that reads as a Cirrus does, by chance.
+    let chance = [(Sr6::Register, 0x12), (Sr6::Register, 0x0F)];
+    for (sr6, before) in kinds.into_iter().flatten().chain(fixed).chain(chance) {
+        let card = set_without_dispi(sr6, before);
+        assert_eq!(card.registers[&(SEQUENCER, 6)], before, "{sr6:?}");
+        for extension in CIRRUS_EXTENSIONS {
+            assert!(!card.registers.contains_key(&extension), "{sr6:?}");
+        }
+        // PEL Mask is read once, with the other registers.
+        let opened = card.log.iter().filter(|a| **a == Access::In(PEL_MASK));
+        assert_eq!(opened.count(), 1, "{sr6:?}");
+    }
 }
 
 #[test]
@@ -359,17 +405,24 @@ fn a_page_that_may_be_on_the_screen_is_not_drawn_on() {
     let mut recorder = Recorder::new();
     let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
     for _ in 0..12 {
-        card.bus().log.clear();
         card.begin(&background);
+        card.bus().log.clear();
         card.flip();
-        let log = &card.bus().log;
-        // The flip is written when the card was last seen displaying.
-        let flip = log
-            .iter()
-            .position(|a| matches!(a, Access::Out16(CRTC, _)))
-            .unwrap();
-        assert_eq!(log[flip - 1], Access::In(INPUT_STATUS_1));
-        assert_eq!(card.bus().status[0] & DISPLAY_DISABLED, 0);
+        // One write of one byte: the beam's place does not matter.
+        let [Access::Out16(CRTC, flip)] = card.bus().log[..] else {
+            panic!("{:?}", card.bus().log);
+        };
+        assert_eq!(flip.to_le_bytes()[0], START_ADDRESS_HIGH);
+        // The display is seen after the write, and the retrace after that.
+        card.bus().status = vec![
+            VERTICAL_RETRACE | DISPLAY_DISABLED,
+            VERTICAL_RETRACE | DISPLAY_DISABLED,
+            0,
+            0,
+        ];
+        card.bus().log.clear();
+        card.settle();
+        assert_eq!(card.bus().log, [Access::In(INPUT_STATUS_1); 4]);
     }
     // Three pages: the page after next was on the screen when the last flip was written, so
     // every second picture waits for a retrace before its first store.
@@ -391,13 +444,23 @@ fn a_page_that_may_be_on_the_screen_is_not_drawn_on() {
 }
 
 #[test]
-#[should_panic(expected = "never reported display")]
+#[should_panic(expected = "the card reports no display in 10000000 reads of Input Status 1, which")]
 fn a_dead_card_is_told_and_not_waited_for() {
     let mut recorder = Recorder::new();
     let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
     card.bus().status = vec![0xFF];
-    card.begin(&[0; HEIGHT]);
     card.flip();
+    card.settle();
+}
+
+#[test]
+fn a_mode_set_without_a_beam_is_refused() {
+    for (actual, expected) in [(0xFF, "display"), (0x00, "vertical retrace")] {
+        let mut recorder = Recorder::new();
+        recorder.status = vec![actual];
+        let stuck = ModeX::set(&mut recorder, &BLACK).unwrap_err();
+        assert_eq!(stuck, SetError::Beam(Stuck { expected, actual }));
+    }
 }
 
 #[test]

@@ -1,8 +1,9 @@
 //! The attribute controller: index and data by turns through one port.
 
-use modex::registers::PALETTE_ADDRESS_SOURCE;
-
 use crate::fault::Complaint;
+
+/// Address bit 5, PAS: 0 opens the palette registers and blanks the picture.
+const PALETTE_ADDRESS_SOURCE: u8 = 0x20;
 
 /// AR10: graphics, 256 colours.
 const MODE_CONTROL: u8 = 0x10;

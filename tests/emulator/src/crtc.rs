@@ -1,29 +1,46 @@
 //! The CRT controller: geometry, start address, and where the beam is.
 
-use modex::registers::{
-    DISPLAY_DISABLED, MODE_X, PROTECT, START_ADDRESS_HIGH, START_ADDRESS_LOW, VERTICAL_RETRACE,
-    VERTICAL_RETRACE_END,
-};
-
 use crate::fault::Complaint;
+use crate::monitor::Timing;
+use crate::ports::{DISPLAY_DISABLED, VERTICAL_RETRACE};
 
-/// What the monitor is sent, in scan lines and character clocks.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Geometry {
-    /// Pixels of the picture across.
-    pub width: usize,
-    /// Scan lines shown.
-    pub lines: usize,
-    /// Scan lines that each line of the picture takes.
-    pub repeat: usize,
-    /// Bytes of a plane from a line to the next.
-    pub stride: usize,
-    /// Scan lines of a frame, those not shown included.
-    total: usize,
-    /// First scan line of the vertical retrace.
-    retrace: usize,
-    /// First scan line after it.
-    retrace_end: usize,
+const START_ADDRESS_HIGH: u8 = 0x0C;
+const START_ADDRESS_LOW: u8 = 0x0D;
+const VERTICAL_RETRACE_END: u8 = 0x11;
+/// CR11 bit 7: CR0 to CR7 are protected.
+const PROTECT: u8 = 0x80;
+
+/// Bits that decide no time: index, mask, the value that Mode X needs, and what they are for. Values
+/// are those of FreeVGA's pages for a mode without text, and of the BIOS's 256-colour mode.
+#[rustfmt::skip]
+const PLAIN: &[(u8, u8, u8, &str)] = &[
+    (0x03, 0x80, 0x80, "lets CR10 and CR11 be read"),
+    (0x03, 0x60, 0x00, "the picture is not skewed against the syncs"),
+    (0x05, 0x60, 0x00, "the retrace is not skewed"),
+    (0x08, 0xFF, 0x00, "no scrolling by lines or bytes"),
+    (0x0A, 0xFF, 0x00, "the text cursor: not shown in graphics"),
+    (0x0B, 0xFF, 0x00, "the text cursor: not shown in graphics"),
+    (0x0E, 0xFF, 0x00, "the text cursor: not shown in graphics"),
+    (0x0F, 0xFF, 0x00, "the text cursor: not shown in graphics"),
+    (0x11, 0x70, 0x20, "no interrupt at the retrace, three refresh cycles a line"),
+    (0x14, 0x1F, 0x00, "the underline: not shown in graphics"),
+    (0x14, 0xA0, 0x00, "the address counter counts each character clock"),
+    (0x17, 0x80, 0x80, "the syncs are on"),
+    (0x17, 0x20, 0x20, "where word addresses wrap: no word addresses here"),
+    (0x17, 0x1C, 0x00, "both counters run at full speed"),
+    (0x17, 0x03, 0x03, "no address bit comes from the line counter"),
+];
+
+/// When the CRTC takes a new start address over. Cards differ; a program must be right with each.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Latch {
+    /// When the last line was shown.
+    DisplayEnd,
+    /// When the vertical retrace begins, as FreeVGA says.
+    #[default]
+    RetraceStart,
+    /// When the next frame's first line begins.
+    DisplayStart,
 }
 
 /// CR0 to CR18, and the beam.
@@ -31,11 +48,15 @@ pub struct Geometry {
 pub(crate) struct Crtc {
     pub index: Option<u8>,
     registers: [Option<u8>; 25],
-    /// The scan line that the beam is on.
-    line: usize,
-    /// Frames begun.
+    /// What they amount to, once all are known.
+    timing: Option<Timing>,
+    latch: Latch,
+    /// Character clocks to the next take-over of the start address, 1 to a frame: that is where the
+    /// beam is. Each access moves it, so this is kept and not the beam's own place.
+    ahead: usize,
+    /// Start addresses taken over.
     pub frames: u64,
-    /// The start address that the running frame shows: taken over at the retrace.
+    /// The start address that was taken over last.
     latched: Option<u16>,
     /// Which half of the start address was changed in which frame, and not taken over whole.
     changed: [Option<u64>; 2],
@@ -46,11 +67,11 @@ impl Crtc {
         *self.registers.get(usize::from(index))?
     }
 
-    /// Registers that decide nothing here but would garble a monitor's picture must hold what
-    /// every source of the mode agrees on.
-    pub fn write(&mut self, index: u8, value: u8) -> Result<(), Complaint> {
+    /// Returns every fault of the write. The times are checked as soon as all registers are known,
+    /// and from then on at each write to one that decides them.
+    pub fn write(&mut self, index: u8, value: u8) -> Vec<Complaint> {
         let Some(register) = self.registers.get(usize::from(index)) else {
-            return Err(("unused register", format!("CR{index:02X}")));
+            return vec![("unused register", format!("CR{index:02X}"))];
         };
         // Before it was written the protection is as the BIOS leaves it: on.
         let end = self.registers[usize::from(VERTICAL_RETRACE_END)];
@@ -58,24 +79,62 @@ impl Crtc {
         if index <= 7 && protected {
             // The chip drops the write, but for CR7 bit 4.
             let state = format!("CR{index:02X} = {value:02X}h while CR11 = {end:02X?}");
-            return Err(("write to a protected register", state));
+            return vec![("write to a protected register", state)];
         }
         let old = *register;
         self.registers[usize::from(index)] = Some(value);
-        let half = match index {
-            START_ADDRESS_HIGH => 0,
-            START_ADDRESS_LOW => 1,
-            VERTICAL_RETRACE_END if value | PROTECT == MODE_X.crtc[usize::from(index)] => {
-                return Ok(());
-            }
-            _ if value == MODE_X.crtc[usize::from(index)] => return Ok(()),
-            _ => return Err(("unused value", format!("CR{index:02X} = {value:02X}h"))),
-        };
-        if old.is_some() && old != Some(value) {
+        if let Some(half) = [START_ADDRESS_HIGH, START_ADDRESS_LOW]
+            .iter()
+            .position(|&half| half == index)
+        {
+            self.complete();
+            return self
+                .start_written(half, old, value)
+                .err()
+                .into_iter()
+                .collect();
+        }
+        let mut complaints: Vec<Complaint> = PLAIN
+            .iter()
+            .filter(|(of, mask, needed, _)| *of == index && value & mask != *needed)
+            .map(|(_, mask, needed, what)| {
+                let bits = format!("bits {mask:02X}h are to be {needed:02X}h");
+                let state = format!("CR{index:02X} = {value:02X}h: {bits}: {what}");
+                ("unused value", state)
+            })
+            .collect();
+        let first = self.timing.is_none();
+        self.complete();
+        if let Some(timing) = &self.timing {
+            complaints.extend(timing.faults((!first).then_some(index)));
+        }
+        complaints
+    }
+
+    /// Computes the times once all registers are known. The beam stays where it is.
+    fn complete(&mut self) {
+        if self.registers.iter().all(Option::is_some) {
+            let beam = self.timing.as_ref().map_or(0, |timing| self.beam(timing));
+            let timing = Timing::of(&self.registers.map(Option::unwrap_or_default));
+            self.ahead = self.latch.ahead(&timing, beam);
+            self.timing = Some(timing);
+        }
+    }
+
+    /// Sets when a start address is taken over.
+    pub fn set_latch(&mut self, latch: Latch) {
+        if let Some(timing) = &self.timing {
+            self.ahead = latch.ahead(timing, self.beam(timing));
+        }
+        self.latch = latch;
+    }
+
+    fn start_written(&mut self, half: usize, old: Option<u8>, new: u8) -> Result<(), Complaint> {
+        if old.is_some() && old != Some(new) {
             let other = self.changed[1 - half];
             self.changed[half] = Some(self.frames);
             if other.is_some_and(|frame| frame != self.frames) {
-                let state = "its other half was taken over at a retrace before".into();
+                let state = "its other half was taken over before".into();
                 return Err(("start address is split over a retrace", state));
             }
         }
@@ -91,55 +150,86 @@ impl Crtc {
         ]))
     }
 
-    /// The start address of what is on the screen.
+    /// The start address that was taken over last.
     pub fn shown_address(&self) -> Option<u16> {
         self.latched
     }
 
-    /// Moves the beam by a scan line and tells where it is: Input Status 1.
-    pub fn step(&mut self) -> Result<u8, Complaint> {
-        let geometry = self.geometry()?;
-        self.line = (self.line + 1) % geometry.total;
-        if self.line == geometry.retrace {
-            self.latched = self.start_address();
-            self.frames += 1;
-        }
-        let retrace = (geometry.retrace..geometry.retrace_end).contains(&self.line);
-        let blank = self.line >= geometry.lines;
-        let bit = |on: bool, bit: u8| if on { bit } else { 0 };
-        Ok(bit(retrace, VERTICAL_RETRACE) | bit(blank, DISPLAY_DISABLED))
+    /// The start addresses of pages that will still be seen, if no further one is written: of the
+    /// frame that is being shown, and of those after it.
+    pub fn seen(&self) -> [Option<u16>; 2] {
+        let Some(timing) = &self.timing else {
+            return [None; 2];
+        };
+        // Between the last line and the take-over nothing more is shown of the old page.
+        let dark = self.latch.line(timing).saturating_sub(timing.down.shown);
+        let dark = dark * timing.across.total;
+        let old = self.latched.filter(|_| self.ahead > dark);
+        [old, self.start_address()]
     }
 
-    /// The geometry that the registers make.
-    pub fn geometry(&self) -> Result<Geometry, Complaint> {
-        if let Some(i) = self.registers.iter().position(Option::is_none) {
-            return Err(("register was never written", format!("CR{i:02X}")));
+    /// Character clocks since the frame's first line began.
+    fn beam(&self, timing: &Timing) -> usize {
+        let latch = self.latch.line(timing) * timing.across.total;
+        (latch + timing.frame() - self.ahead) % timing.frame()
+    }
+
+    /// Moves the beam. Before all registers are known there is none.
+    pub fn advance(&mut self, clocks: usize) {
+        let Some(timing) = &self.timing else { return };
+        if clocks < self.ahead {
+            self.ahead -= clocks;
+            return;
         }
-        let register = |index: usize| usize::from(self.registers[index].unwrap_or(0));
-        // CR7 holds the bits 8 and 9 of vertical positions; CR9 bits 0-4 repeat each line.
-        let overflow = register(0x07);
-        let ninth_and_tenth =
-            |low: u32, high: u32| (overflow >> low & 1) << 8 | (overflow >> high & 1) << 9;
-        let total = (register(0x06) | ninth_and_tenth(0, 5)) + 2;
-        let lines = (register(0x12) | ninth_and_tenth(1, 6)) + 1;
-        let retrace = register(0x10) | ninth_and_tenth(2, 7);
-        // CR11 holds the last four bits of the line after the retrace, 1 to 16 lines on.
-        let next = retrace + 1;
-        let retrace_end = next + (register(0x11).wrapping_sub(next) & 15);
-        // CR14 bit 6: dwords, CR17 bit 6: bytes; CR13 counts two of either.
-        let unit = match (register(0x14) & 0x40 != 0, register(0x17) & 0x40 != 0) {
-            (true, _) => 4,
-            (false, true) => 1,
-            (false, false) => 2,
+        let past = clocks - self.ahead;
+        self.ahead = timing.frame() - past % timing.frame();
+        self.frames += 1 + (past / timing.frame()) as u64;
+        self.latched = self.start_address();
+    }
+
+    /// Character clocks to the next take-over of the start address.
+    pub fn to_take_over(&self) -> Option<usize> {
+        self.timing.as_ref().map(|_| self.ahead)
+    }
+
+    /// Input Status 1.
+    pub fn status(&self) -> u8 {
+        let Some(timing) = &self.timing else {
+            // The attribute controller may be reached before the CRTC is set.
+            return DISPLAY_DISABLED;
         };
-        Ok(Geometry {
-            width: (register(0x01) + 1) * 4,
-            lines,
-            repeat: (register(0x09) & 0x1F) + 1,
-            stride: register(0x13) * 2 * unit,
-            total,
-            retrace,
-            retrace_end,
+        let beam = self.beam(timing);
+        let (line, clock) = (beam / timing.across.total, beam % timing.across.total);
+        let retrace = timing.down.retrace.contains(&line);
+        let blank = line >= timing.down.shown || clock >= timing.across.shown;
+        let bit = |on: bool, bit: u8| if on { bit } else { 0 };
+        bit(retrace, VERTICAL_RETRACE) | bit(blank, DISPLAY_DISABLED)
+    }
+
+    /// The times that the registers make.
+    pub fn timing(&self) -> Result<&Timing, Complaint> {
+        self.timing.as_ref().ok_or_else(|| {
+            let unknown = self.registers.iter().position(Option::is_none);
+            let state = format!("CR{:02X}", unknown.unwrap_or_default());
+            ("register was never written", state)
         })
+    }
+}
+
+impl Latch {
+    /// The scan line at whose begin a start address is taken over, modulo the lines of a frame.
+    fn line(self, timing: &Timing) -> usize {
+        match self {
+            Self::DisplayEnd => timing.down.shown,
+            Self::RetraceStart => timing.down.retrace.start,
+            Self::DisplayStart => timing.down.total,
+        }
+    }
+
+    /// Character clocks from a place of the beam to the take-over, 1 to a frame.
+    fn ahead(self, timing: &Timing, beam: usize) -> usize {
+        let (latch, frame) = (self.line(timing) * timing.across.total, timing.frame());
+        // Registers that were changed under the beam may have made the frame shorter.
+        (latch % frame + frame - 1 - beam % frame) % frame + 1
     }
 }

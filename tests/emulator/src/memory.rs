@@ -1,9 +1,12 @@
 //! Video memory: four planes, and the latches between them and the CPU.
 
-use modex::{PAGE_BYTES, PAGES, PLANE_BYTES};
+use crate::monitor::NEEDED;
+use crate::ports::PLANE_BYTES;
 
-/// First byte behind the last page.
-pub(crate) const PAGES_END: usize = PAGES * PAGE_BYTES;
+/// Bytes of a page in each plane.
+pub(crate) const PAGE_BYTES: usize = NEEDED.stride * (NEEDED.down.shown / NEEDED.repeat);
+/// First byte behind the last page of as many as there is room for.
+pub(crate) const PAGES_END: usize = PLANE_BYTES / PAGE_BYTES * PAGE_BYTES;
 
 /// Four planes of 64 KiB, and a latch for each.
 #[derive(Clone, Debug)]

@@ -35,18 +35,19 @@ impl Page {
     pub(crate) fn of(card: &Vga) -> Result<Self, Complaint> {
         card.sequencer.check_picture()?;
         card.attribute.check_picture(card.graphics.is_graphics())?;
-        let geometry = card.crtc.geometry()?;
+        let timing = card.crtc.timing()?;
+        // A pixel of 256 colours takes two of the 8 dots of a character.
+        let (width, height) = (timing.across.shown * 4, timing.down.shown / timing.repeat);
         let Some(start) = card.crtc.shown_address() else {
             return Err((
                 "no frame was begun",
                 "the beam never came to a retrace".into(),
             ));
         };
-        let height = geometry.lines / geometry.repeat;
-        let mut pixels = Vec::with_capacity(geometry.width * height);
+        let mut pixels = Vec::with_capacity(width * height);
         for y in 0..height {
-            for x in 0..geometry.width {
-                let offset = y * geometry.stride + x / 4;
+            for x in 0..width {
+                let offset = y * timing.stride + x / 4;
                 // The address counter is 16 bits wide: it wraps within the plane.
                 let at = start.wrapping_add(offset as u16);
                 pixels.push(card.attribute.colour(card.memory.peek(x & 3, at)));
@@ -58,11 +59,11 @@ impl Page {
         }
         Ok(Self {
             start,
-            width: geometry.width,
+            width,
             height,
             pixels,
             palette,
-            repeat: geometry.repeat,
+            repeat: timing.repeat,
         })
     }
 

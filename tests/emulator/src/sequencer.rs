@@ -1,14 +1,18 @@
 //! The sequencer: reset, clocking, and which planes a store reaches.
 
-use modex::registers::{CLOCKING_MODE, MAP_MASK, RESET, SCREEN_DISABLE};
-
 use crate::fault::Complaint;
+
+const RESET: u8 = 0;
+const CLOCKING_MODE: u8 = 1;
+const MAP_MASK: u8 = 2;
+/// SR1 bit 5.
+const SCREEN_DISABLE: u8 = 0x20;
 
 /// SR0 with both reset bits set: running.
 const RUNNING: u8 = 0x03;
 /// SR0 in synchronous reset.
 const SYNCHRONOUS_RESET: u8 = 0x01;
-/// SR4: extended memory, odd/even off, chain-4 off.
+/// SR4: extended memory, odd/even off, chain-4 off (Abrash, chapter 47: "turn off chain-4").
 const UNCHAINED: u8 = 0x06;
 
 /// SR0 to SR4. Nothing is known of a register before it is written.
@@ -30,9 +34,10 @@ impl Sequencer {
         *register = Some(value);
         let used: &[u8] = match index {
             RESET => &[SYNCHRONOUS_RESET, RUNNING],
-            // 8-dot clock, screen on or off.
+            // FreeVGA: 8 dots a character, the dot clock not halved, screen on or off.
             CLOCKING_MODE => &[0x01, 0x01 | SCREEN_DISABLE],
             MAP_MASK => &[0x1, 0x2, 0x4, 0x8, 0xF],
+            // The font: text only.
             3 => &[0x00],
             _ => &[UNCHAINED],
         };

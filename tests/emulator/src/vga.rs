@@ -2,17 +2,31 @@
 
 use std::collections::BTreeMap;
 
-use modex::registers::*;
-use modex::{Bus, Lane, PAGE_BYTES, PLANE_BYTES, Purpose};
+use modex::{Bus, Lane, Purpose};
 
 use crate::attribute::Attribute;
-use crate::crtc::Crtc;
+use crate::crtc::{Crtc, Latch};
 use crate::dac::Dac;
 use crate::fault::{Access, Complaint, Fault};
 use crate::graphics::Graphics;
-use crate::memory::{Memory, PAGES_END};
+use crate::memory::{Memory, PAGE_BYTES, PAGES_END};
+use crate::monitor;
+use crate::ports::*;
 use crate::scanout::{Page, Picture};
 use crate::sequencer::Sequencer;
+
+/// Character clocks that each access takes: 0.95 us, as an 8-bit access does on an ISA bus.
+const ACCESS: usize = 3;
+
+/// How much time passes before an access, beside the time that the access takes: an interrupt handler
+/// ran, or the bus was busy.
+struct Delay(Option<Box<dyn FnMut(Access) -> usize>>);
+
+impl std::fmt::Debug for Delay {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(if self.0.is_some() { "some" } else { "none" })
+    }
+}
 
 /// A card as the boot loader leaves it: in a linear mode, no VGA register known.
 #[derive(Debug)]
@@ -34,6 +48,7 @@ pub struct Vga {
     stores: BTreeMap<Purpose, u64>,
     log: Option<Vec<Access>>,
     faults: Vec<Fault>,
+    delay: Delay,
 }
 
 impl Vga {
@@ -54,6 +69,7 @@ impl Vga {
             stores: BTreeMap::new(),
             log: None,
             faults: Vec::new(),
+            delay: Delay(None),
         }
     }
 
@@ -117,14 +133,30 @@ impl Vga {
         Ok(self.page()?.scan_out())
     }
 
-    /// Moves the beam until a retrace has begun, as a monitor would without any program.
+    /// Has the beam move until a start address is taken over, as a monitor would without any program.
     pub fn finish_frame(&mut self) {
-        let frame = self.crtc.frames;
-        while self.crtc.frames == frame {
-            if let Err(complaint) = self.crtc.step() {
-                return self.note(Access::In8(INPUT_STATUS_1), Err(complaint));
+        match self.crtc.to_take_over() {
+            Some(clocks) => self.crtc.advance(clocks),
+            None => {
+                let complaint = self.crtc.timing().err();
+                self.note(Access::ScanOut, complaint.map_or(Ok(()), Err));
             }
         }
+    }
+
+    /// Lets time pass without an access, in character clocks: 100 of them are a scan line.
+    pub fn pass(&mut self, clocks: usize) {
+        self.crtc.advance(clocks);
+    }
+
+    /// Has `delay` say before each access how many character clocks pass, beside those of the access.
+    pub fn set_delay(&mut self, delay: impl FnMut(Access) -> usize + 'static) {
+        self.delay = Delay(Some(Box::new(delay)));
+    }
+
+    /// Sets when a new start address is taken over.
+    pub fn set_latch(&mut self, latch: Latch) {
+        self.crtc.set_latch(latch);
     }
 
     fn note(&mut self, access: Access, outcome: Result<(), Complaint>) {
@@ -137,13 +169,16 @@ impl Vga {
         }
     }
 
+    /// Each access takes its time, and has its effect at the end of it.
     fn log(&mut self, access: Access) {
+        let delay = self.delay.0.as_mut().map_or(0, |delay| delay(access));
+        self.crtc.advance(ACCESS + delay);
         if let Some(log) = &mut self.log {
             log.push(access);
         }
     }
 
-    /// Every access to the VGA proper begins here.
+    /// Each access to the VGA proper begins here.
     fn begin(&mut self, access: Access) {
         self.log(access);
         if self.dispi {
@@ -161,7 +196,12 @@ impl Vga {
         let outcome = match port {
             SEQUENCER => self.sequencer.write(index, value),
             GRAPHICS => self.graphics.write(index, value),
-            _ => self.crtc.write(index, value),
+            _ => {
+                for complaint in self.crtc.write(index, value) {
+                    self.note(access, Err(complaint));
+                }
+                return;
+            }
         };
         self.note(access, outcome);
     }
@@ -176,10 +216,10 @@ impl Vga {
 
     fn write_misc(&mut self, value: u8) -> Result<(), Complaint> {
         let old = self.misc.replace(value);
-        if value != MODE_X.misc {
+        if let Some(why) = monitor::misc_fault(value) {
             return Err((
                 "unused value",
-                format!("Miscellaneous Output = {value:02X}h"),
+                format!("Miscellaneous Output = {value:02X}h: {why}"),
             ));
         }
         if old != Some(value) && !self.sequencer.in_reset() {
@@ -207,10 +247,11 @@ impl Vga {
         if self.purpose == Purpose::Setup || !self.sequencer.screen_is_on() {
             return Ok(());
         }
-        for (start, what) in [
-            (self.crtc.shown_address(), "is on the screen"),
-            (self.crtc.start_address(), "will be on the screen"),
-        ] {
+        let seen = self.crtc.seen();
+        for (start, what) in seen
+            .into_iter()
+            .zip(["is on the screen", "will be on the screen"])
+        {
             if let Some(start) = start
                 && usize::from(at.wrapping_sub(start)) < PAGE_BYTES
             {
@@ -334,11 +375,7 @@ impl Bus for Vga {
         let (value, what) = match port {
             INPUT_STATUS_1 => {
                 self.attribute.reset_flip_flop();
-                return match self.crtc.step() {
-                    Ok(status) => status,
-                    // The attribute controller may be reached before the CRTC is set.
-                    Err(_) => DISPLAY_DISABLED,
-                };
+                return self.crtc.status();
             }
             MISC_READ => (self.misc, "Miscellaneous Output".to_owned()),
             PEL_DATA => match self.dac.read_data() {
@@ -372,7 +409,7 @@ impl Bus for Vga {
         let access = Access::In16(port);
         self.log(access);
         match (port, self.dispi_index) {
-            (DISPI_DATA, Some(DISPI_ID)) => 0xB0C5,
+            (DISPI_DATA, Some(DISPI_ID)) => DISPI_ID5,
             _ => {
                 self.note(
                     access,

@@ -1,6 +1,6 @@
 //! What the card does with accesses that are well.
 
-use emulator::{Access, Vga};
+use emulator::{Access, Latch, Vga};
 use modex::registers::*;
 use modex::{Bus, HEIGHT, ModeX, Purpose, STRIDE, WIDTH};
 
@@ -29,13 +29,20 @@ fn the_palette_reads_back_as_it_was_written() {
     assert_eq!(card.palette(), palette());
 }
 
-/// What Input Status 1 reads, and for how many scan lines, from the second line of a retrace to
-/// the first of the next one.
-fn beam(vga: &mut Vga) -> Vec<(u8, usize)> {
+/// Character clocks that an access takes, of a line, and of a frame.
+const ACCESS: usize = 3;
+const LINE: usize = 100;
+const FRAME: usize = 527 * LINE;
+
+/// What Input Status 1 reads, and for how many scan lines, from the first line of a retrace on;
+/// `clock` says where in each line it is read.
+fn beam(vga: &mut Vga, clock: usize) -> Vec<(u8, usize)> {
     vga.finish_frame();
+    vga.pass(clock - ACCESS);
     let mut beam: Vec<(u8, usize)> = Vec::new();
     for _ in 0..527 {
         let status = vga.in8(INPUT_STATUS_1);
+        vga.pass(LINE - ACCESS);
         match beam.last_mut() {
             Some((last, lines)) if *last == status => *lines += 1,
             _ => beam.push((status, 1)),
@@ -47,37 +54,94 @@ fn beam(vga: &mut Vga) -> Vec<(u8, usize)> {
 #[test]
 fn the_beam_is_where_the_registers_say() {
     let retrace = VERTICAL_RETRACE | DISPLAY_DISABLED;
-    let frame = |retraces: usize| {
-        [
-            (retrace, retraces - 1),
-            (DISPLAY_DISABLED, 37 - retraces),
-            (0, 480),
+    let frame = |retraces: usize, line: u8| {
+        let blank = 37 - retraces;
+        let all = [
+            (retrace, retraces),
+            (DISPLAY_DISABLED, blank),
+            (line, 480),
             (DISPLAY_DISABLED, 10),
-            (retrace, 1),
-        ]
+        ];
+        match line {
+            0 => all.to_vec(),
+            _ => vec![(retrace, retraces), (DISPLAY_DISABLED, blank + 480 + 10)],
+        }
     };
     let mut vga = striped();
-    assert_eq!(beam(&mut vga), frame(2));
+    // 80 of the 100 character clocks of a line are shown.
+    assert_eq!(beam(&mut vga, ACCESS), frame(2, 0));
+    assert_eq!(beam(&mut vga, 79), frame(2, 0));
+    assert_eq!(beam(&mut vga, 80), frame(2, DISPLAY_DISABLED));
+    assert_eq!(beam(&mut vga, 99), frame(2, DISPLAY_DISABLED));
     // No scene uses it: a retrace that ends on the four bits it began with.
     vga.out16(CRTC, word(VERTICAL_RETRACE_END, 0x2A));
     vga.take_faults();
-    assert_eq!(beam(&mut vga), frame(16));
+    assert_eq!(beam(&mut vga, ACCESS), frame(16, 0));
+}
+
+#[test]
+fn every_access_takes_its_time() {
+    let mut vga = striped();
+    vga.finish_frame();
+    // The retrace is two lines long: 66 accesses of 3 clocks, and the 67th is past its end.
+    for _ in 0..60 {
+        vga.out8(SEQUENCER, MAP_MASK);
+    }
+    vga.store64(0, 0);
+    assert_eq!(vga.in8(INPUT_STATUS_1) & VERTICAL_RETRACE, 0);
+    vga.finish_frame();
+    for _ in 0..65 {
+        vga.out8(SEQUENCER, MAP_MASK);
+    }
+    assert_ne!(vga.in8(INPUT_STATUS_1) & VERTICAL_RETRACE, 0);
+    assert_eq!(vga.in8(INPUT_STATUS_1) & VERTICAL_RETRACE, 0);
+    // A delay comes before the access.
+    vga.finish_frame();
+    vga.set_delay(|access| match access {
+        Access::Out8(PEL_MASK, _) => 2 * LINE,
+        _ => 0,
+    });
+    assert_ne!(vga.in8(INPUT_STATUS_1) & VERTICAL_RETRACE, 0);
+    vga.out8(PEL_MASK, 0xFF);
+    assert_eq!(vga.in8(INPUT_STATUS_1) & VERTICAL_RETRACE, 0);
+}
+
+#[test]
+fn a_start_address_is_taken_over_when_the_latch_says() {
+    for (latch, line) in [
+        (Latch::DisplayEnd, 480),
+        (Latch::RetraceStart, 490),
+        (Latch::DisplayStart, 527),
+    ] {
+        let mut vga = striped();
+        // The first line begins now.
+        vga.finish_frame();
+        vga.pass((527 - 490) * LINE);
+        vga.set_latch(latch);
+        vga.out16(CRTC, word(START_ADDRESS_HIGH, 0x96));
+        vga.pass(line * LINE - ACCESS - 1);
+        assert_eq!(vga.page().unwrap().start, 0x4B00, "{latch:?}");
+        vga.pass(1);
+        assert_eq!(vga.page().unwrap().start, 0x9600, "{latch:?}");
+        // However much time passes at once, and never before.
+        vga.out16(CRTC, word(START_ADDRESS_HIGH, 0));
+        vga.pass(FRAME - ACCESS - 1);
+        assert_eq!(vga.page().unwrap().start, 0x9600, "{latch:?}");
+        vga.pass(3 * FRAME);
+        assert_eq!(vga.page().unwrap().start, 0, "{latch:?}");
+    }
 }
 
 /// Until a retrace the CRTC shows from the start address that was there before.
 #[test]
 fn a_mode_set_shows_page_0_wherever_the_beam_was() {
     let mut card = ModeX::set(Vga::new(), &palette()).unwrap();
-    // The mode set itself reads Input Status 1 some fifty times: a line each.
-    for line in 400..500 {
+    for line in (0..527).step_by(5) {
         card.begin(&[0; HEIGHT]);
         card.flip();
         card.settle();
         assert_eq!(card.bus().page().unwrap().start, 0x4B00);
-        // The retrace is line 490 of 527.
-        for _ in 490..527 + line {
-            card.bus().in8(INPUT_STATUS_1);
-        }
+        card.bus().pass(line * LINE);
         card.reset(&palette()).unwrap();
         assert_eq!(card.bus().page().unwrap().start, 0, "line {line}");
     }
@@ -141,10 +205,12 @@ fn a_log_played_to_another_card_makes_it_the_same() {
     play(&mut twin, &log);
     assert!(twin.take_log() == log);
     assert_eq!(twin.page().unwrap(), vga.page().unwrap());
-    // Without the wait that follows the last store there is nothing to show yet.
-    let stored = log.iter().rposition(|a| matches!(a, Access::Store(..)));
+    // Before the planes are cleared no frame has passed: there is nothing to show yet.
+    let loaded = log
+        .iter()
+        .rposition(|a| matches!(a, Access::Out8(PEL_DATA, _)));
     let mut early = Vga::new();
-    play(&mut early, &log[..=stored.unwrap()]);
+    play(&mut early, &log[..=loaded.unwrap()]);
     early.out16(SEQUENCER, word(CLOCKING_MODE, 0x01));
     assert_eq!(early.page().unwrap_err().name, "no frame was begun");
 }

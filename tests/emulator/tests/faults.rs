@@ -51,9 +51,34 @@ fn registers_ports_and_values_that_no_scene_uses() {
     faults(unused, "GR5 = 01h", |v| v.out16(GRAPHICS, word(5, 0x01)));
     faults(unused, "GR8 = F0h", |v| v.out16(GRAPHICS, word(8, 0xF0)));
     faults("unused register", "GR9", |v| v.out16(GRAPHICS, word(9, 0)));
-    faults(unused, "CR13 = 50h", |v| v.out16(CRTC, word(0x13, 0x50)));
+    faults(
+        "wrong timing",
+        "80 bytes needed, the write gives 160",
+        |v| {
+            v.out16(CRTC, word(0x13, 0x50));
+        },
+    );
     faults(unused, "CR17 = C3h", |v| v.out16(CRTC, word(0x17, 0xC3)));
-    faults(unused, "CR11 = ADh", |v| v.out16(CRTC, word(0x11, 0xAD)));
+    faults(
+        "wrong timing",
+        "492 lines needed, the write gives 493",
+        |v| {
+            v.out16(CRTC, word(0x11, 0xAD));
+        },
+    );
+    faults(
+        "wrong timing",
+        "CR06, CR07 vertical total: 527 lines needed, the write gives 525",
+        |v| {
+            v.out16(CRTC, word(0x11, 0x2C));
+            v.out16(CRTC, word(0x06, 0x0B));
+        },
+    );
+    faults(unused, "bits 7 and 6: the polarity of the syncs", |v| {
+        v.out16(SEQUENCER, word(RESET, 0x01));
+        v.out8(MISC_WRITE, 0x63);
+        v.out16(SEQUENCER, word(RESET, 0x03));
+    });
     faults("unused register", "CR19", |v| v.out16(CRTC, word(0x19, 0)));
     for address in [0x15, 0x50, 0x90] {
         faults("unused register", &format!("AR{address:02X}"), |v| {

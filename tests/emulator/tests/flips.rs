@@ -1,0 +1,168 @@
+//! Flips that cannot tear, at every place of the beam and with any delay: the beam moves with each
+//! access, interrupts come before any of them, and a store to a page that will still be seen is a
+//! fault.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use emulator::{Latch, Vga};
+use modex::registers::*;
+use modex::{Bus, Destination, HEIGHT, ModeX, Purpose, STRIDE};
+
+const BLACK: [[u8; 3]; 256] = [[0; 3]; 256];
+const LATCHES: [Latch; 3] = [Latch::DisplayEnd, Latch::RetraceStart, Latch::DisplayStart];
+/// Character clocks of a line and of a frame.
+const LINE: usize = 100;
+const FRAME: usize = 527 * LINE;
+/// The beam's places that a test begins at: each line, at its begin, in the middle and in the blank.
+fn places() -> impl Iterator<Item = usize> {
+    (0..FRAME)
+        .step_by(LINE)
+        .flat_map(|line| [0, 41, 97].map(|clock| line + clock))
+}
+/// Delays: none, 0.3 ms of a keyboard's handler, the 10 lines between the last line and the retrace,
+/// the retrace, the whole blank, most of a frame, and more than one.
+const DELAYS: [usize; 8] = [
+    0,
+    9 * LINE,
+    10 * LINE,
+    12 * LINE,
+    47 * LINE,
+    300 * LINE,
+    FRAME - LINE,
+    FRAME + 20 * LINE,
+];
+
+/// An index and its data, as a word to an index port.
+fn word(index: u8, value: u8) -> u16 {
+    u16::from_le_bytes([index, value])
+}
+
+/// A card in Mode X, and the number of accesses until `delay` passes before one.
+fn card(latch: Latch, delay: Rc<Cell<usize>>) -> (ModeX<Vga>, Rc<Cell<usize>>) {
+    let mut card = ModeX::set(Vga::new(), &BLACK).unwrap();
+    card.bus().set_latch(latch);
+    card.bus().finish_frame();
+    let left = Rc::new(Cell::new(usize::MAX));
+    let counter = left.clone();
+    card.bus().set_delay(move |_| {
+        let now = counter.get();
+        counter.set(now.wrapping_sub(1));
+        if now == 0 { delay.get() } else { 0 }
+    });
+    (card, left)
+}
+
+/// Draws the next page, has `flip_and_wait` flip to it with the beam at `place` after the take-over,
+/// and stores to the page that was shown before. Returns what the card finds wrong with that.
+fn first_store(
+    card: &mut ModeX<Vga>,
+    place: usize,
+    start: impl FnOnce(),
+    flip_and_wait: impl FnOnce(&mut ModeX<Vga>),
+) -> Vec<String> {
+    let old = card.start_address();
+    card.begin(&[0; HEIGHT]);
+    card.bus().finish_frame();
+    card.bus().pass(place);
+    start();
+    flip_and_wait(card);
+    let vga = card.bus();
+    vga.purpose(Purpose::Draw);
+    vga.lane::<STRIDE>(old, 1, |lane| lane.fill(|| 1));
+    let faults = vga.take_faults();
+    faults.iter().map(ToString::to_string).collect()
+}
+
+/// The order that the driver had: the display is seen, then the address is written, and the retrace
+/// is waited for.
+fn display_then_write(card: &mut ModeX<Vga>) {
+    let vga = card.bus();
+    vga.purpose(Purpose::Flip);
+    while vga.in8(INPUT_STATUS_1) & DISPLAY_DISABLED != 0 {}
+    vga.out16(CRTC, word(START_ADDRESS_HIGH, 0x4B));
+    while vga.in8(INPUT_STATUS_1) & VERTICAL_RETRACE == 0 {}
+}
+
+#[test]
+fn whatever_comes_between_the_accesses_no_page_is_drawn_on_that_is_seen() {
+    for latch in LATCHES {
+        let delay = Rc::new(Cell::new(0));
+        let (mut card, left) = card(latch, delay.clone());
+        for (case, place) in places().enumerate() {
+            delay.set(DELAYS[case % DELAYS.len()]);
+            // Before the write, between it and the first status, and in the waits.
+            let access = [0, 1, 2, 3, 7, 40, 500][case % 7];
+            let faults = first_store(
+                &mut card,
+                place,
+                || left.set(access),
+                |card| {
+                    card.flip();
+                    card.settle();
+                },
+            );
+            let delay = delay.get();
+            let case = format!("{latch:?}, beam at {place}, delay {delay} before access {access}");
+            assert_eq!(faults, [""; 0], "{case}");
+            if place % 9 == 0 {
+                let start = card.start_address();
+                card.bus().finish_frame();
+                assert_eq!(card.bus().page().unwrap().start, start, "{case}");
+            }
+        }
+    }
+}
+
+/// The test can fail: with the other order it does, just where the driver's comment says.
+#[test]
+fn the_other_order_tears_when_an_interrupt_comes_before_the_write() {
+    // The middle of the last line that is shown, as seen from each take-over; the display is seen by
+    // access 0, and the write is access 1.
+    for (latch, lines) in [(Latch::DisplayEnd, 47), (Latch::RetraceStart, 37)] {
+        let place = (lines + 479) * LINE + 40;
+        for (interrupt, tears) in [(0, false), (11 * LINE, true)] {
+            let (mut card, left) = card(latch, Rc::new(Cell::new(interrupt)));
+            let start = || left.set(1);
+            let faults = first_store(&mut card, place, start, display_then_write);
+            assert_eq!(faults.len(), usize::from(tears), "{latch:?}: {faults:?}");
+            assert!(
+                faults
+                    .iter()
+                    .all(|fault| fault.contains("is on the screen"))
+            );
+        }
+    }
+}
+
+/// Frame after frame, drawn by the driver, with an interrupt of any length before one access in a few.
+#[test]
+fn pages_rotate_unseen_whatever_interrupts() {
+    let mut random = seeded::generator();
+    for case in 0..seeded::cases(12) {
+        let latch = LATCHES[case as usize % 3];
+        let mut card = ModeX::set(Vga::new(), &BLACK).unwrap();
+        card.bus().set_latch(latch);
+        card.bus().finish_frame();
+        let rare = random.u32(1..2_000);
+        let longest = random.usize(1..2 * FRAME);
+        let mut delays = random.fork();
+        card.bus().set_delay(move |_| match delays.u32(..rare) {
+            0 => delays.usize(..longest),
+            _ => 0,
+        });
+        for picture in 0..20 {
+            let mut canvas = card.begin(&[0; HEIGHT]);
+            for _ in 0..random.usize(1..30) {
+                let (x, y) = (random.u16(..320), random.u16(..HEIGHT as u16));
+                let len = random.u16(1..=HEIGHT as u16 - y);
+                canvas.column(x, y, len, |column| column.fill(|| 1));
+            }
+            card.flip();
+            if random.bool() {
+                card.settle();
+            }
+            assert_eq!(card.bus().take_faults(), [], "{latch:?}, picture {picture}");
+        }
+    }
+}
