@@ -14,15 +14,33 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crystal_ball::card::{self, Card, Emulated};
-use crystal_ball::machine::{Machine, Verdict};
+use crystal_ball::machine::{Config, Limits, Machine, Verdict};
 use link::{Action, Change, Command, Content, Fault, Picture};
 use modex::registers::MODE_X;
+use rustix::process::{Pid, Signal, kill_process};
 
 use crate::judged::{Judged, verdict};
 use crate::ready::{READY, config};
 
 fn boot() -> Machine {
-    Machine::boot(&config()).expect("boots")
+    boot_with(&[], Limits::default())
+}
+
+fn boot_with(arguments: &[&str], limits: Limits) -> Machine {
+    let config = Config {
+        arguments: arguments.iter().map(Into::into).collect(),
+        limits,
+        ..config()
+    };
+    Machine::boot(&config).expect("boots")
+}
+
+/// Limits under which a test sees a hang soon. The boot keeps its own.
+fn short() -> Limits {
+    Limits {
+        answer: Duration::from_secs(1),
+        ..Limits::default()
+    }
 }
 
 #[test]
@@ -108,13 +126,21 @@ fn a_steered_show_is_brought_back_by_its_log() {
         machine.key(key, true).unwrap();
         machine.key(key, false).unwrap();
     }
+    // QEMU hands on keys when it comes to it, and drops what its buffer has no room for: the scene
+    // is not to change between two of them.
+    let mut log = Vec::new();
+    while !log.iter().any(|line: &String| line.ends_with(" nearer")) {
+        machine.key("pgup", true).unwrap();
+        machine.key("pgup", false).unwrap();
+        machine.rest(Duration::from_millis(50)).unwrap();
+        log = machine.ask(Command::Log).unwrap();
+    }
     let steer = |name| Command::Steer(None, Change::Act(Action::parse(name).unwrap()));
     for name in ["next-scene", "pitch-up", "coarser"] {
         machine.ask(steer(name)).unwrap();
         machine.rest(Duration::from_millis(100)).unwrap();
     }
     machine.key("spc", true).unwrap();
-    let mut log = Vec::new();
     while !log.iter().any(|line: &String| line.ends_with(" pause")) {
         log = machine.ask(Command::Log).unwrap();
     }
@@ -171,7 +197,11 @@ fn a_steered_show_is_brought_back_by_its_log() {
 
 /// Asks the kernel to break, and returns how that was judged.
 fn failure(fault: Fault) -> Judged {
-    let mut machine = boot();
+    failure_within(Limits::default(), fault)
+}
+
+fn failure_within(limits: Limits, fault: Fault) -> Judged {
+    let mut machine = boot_with(&[], limits);
     let judged = Judged(verdict(machine.ask(Command::Fail(fault))));
     let evidence = judged.0.evidence.as_deref().expect("evidence is kept");
     for name in ["command.txt", "serial.log", "screen.png"] {
@@ -285,38 +315,49 @@ fn an_adapter_that_does_not_take_the_mode_is_named() {
 
 #[test]
 fn a_hang_is_noticed() {
-    let judged = failure(Fault::Hang);
+    let judged = failure_within(short(), Fault::Hang);
     let waited_for = "the answer to 'fail hang'".into();
     assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }
 
+/// What is sent fills the buffers, and then nobody takes it.
+#[test]
+fn a_kernel_that_does_not_read_hangs() {
+    let mut machine = boot_with(&[], short());
+    machine.send_raw(b"fail hang\n").unwrap();
+    let judged = Judged(verdict(machine.send_raw(&vec![b' '; 4 << 20])));
+    let waited_for = "the kernel's reading of what it is sent".into();
+    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+}
+
 /// A machine, and QEMU's monitor, by which the test does what a user does at the window.
-fn boot_with_monitor() -> (Machine, UnixStream) {
+fn boot_with_monitor(limits: Limits) -> (Machine, UnixStream) {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("monitor");
-    let mut config = config();
     let monitor = format!("unix:{},server=on,wait=off", socket.display());
-    config.arguments = vec!["-monitor".into(), monitor.into()];
-    let machine = Machine::boot(&config).unwrap();
+    let machine = boot_with(&["-monitor", &monitor], limits);
     (machine, UnixStream::connect(&socket).unwrap())
 }
 
-/// What GTK's window does when it is closed.
+/// GTK's window quits when it is closed, and its menu has the others. `-no-reboot -no-shutdown`
+/// makes a reset a machine that stands still, and the kernel does not hear of a power button.
 #[test]
-fn a_closed_window_is_the_users_doing() {
-    let (machine, mut monitor) = boot_with_monitor();
-    monitor.write_all(b"quit\n").unwrap();
-    assert_eq!(verdict(machine.watch()).verdict, Verdict::User);
+fn a_machine_ended_at_the_window_is_the_users_doing() {
+    for command in ["quit\n", "system_reset\n", "system_powerdown\n"] {
+        let (machine, mut monitor) = boot_with_monitor(Limits::default());
+        monitor.write_all(command.as_bytes()).unwrap();
+        assert_eq!(verdict(machine.watch()).verdict, Verdict::User, "{command}");
+    }
 }
 
 #[test]
 fn a_paused_machine_does_not_hang() {
-    let (mut machine, mut monitor) = boot_with_monitor();
+    let (mut machine, mut monitor) = boot_with_monitor(short());
     monitor.write_all(b"stop\n").unwrap();
     machine.rest(Duration::from_secs(1)).unwrap();
     // Longer than an answer may take.
     let resume = std::thread::spawn(move || {
-        std::thread::sleep(Duration::from_secs(16));
+        std::thread::sleep(Duration::from_secs(4));
         monitor.write_all(b"cont\n").unwrap();
         monitor
     });
@@ -329,16 +370,94 @@ fn a_paused_machine_does_not_hang() {
 }
 
 #[test]
-fn a_boot_loader_without_its_adapter_is_named() {
-    for (vga, reset) in [("none", false), ("-device bochs-display", true)] {
+fn a_pause_is_not_waited_for_without_end() {
+    let pause = Duration::from_secs(2);
+    let (mut machine, mut monitor) = boot_with_monitor(Limits { pause, ..short() });
+    monitor.write_all(b"stop\n").unwrap();
+    machine.rest(Duration::from_secs(1)).unwrap();
+    let judged = Judged(verdict(machine.ask(Command::Hold)));
+    let waited_for = "the answer to 'hold'".into();
+    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+}
+
+#[test]
+fn a_stop_in_the_boot_loader_names_what_was_found() {
+    let soon = Duration::from_secs(5);
+    for (vga, arguments, boot, resets, words) in [
+        ("none", "", soon, false, &["display adapter"][..]),
+        (
+            "none",
+            "-device bochs-display",
+            Limits::default().boot,
+            true,
+            &["display adapter"],
+        ),
+        (
+            "std",
+            "-m 16",
+            soon,
+            false,
+            &["has 16 MiB", "its screen says", "SECOND STAGE"],
+        ),
+        (
+            "std",
+            "-cpu qemu32",
+            Limits::default().boot,
+            true,
+            &["no long mode"],
+        ),
+    ] {
         let mut config = config();
-        config.vga = "none".into();
-        if vga != "none" {
-            config.arguments = vga.split(' ').map(Into::into).collect();
+        config.vga = vga.into();
+        config.arguments = arguments.split_whitespace().map(Into::into).collect();
+        config.limits.boot = boot;
+        let judged = Judged(verdict(Machine::boot(&config)));
+        let said = judged.0.to_string();
+        let Verdict::BootLoader { reset, .. } = judged.0.verdict else {
+            panic!("{vga} {arguments}: {said}");
+        };
+        assert_eq!(reset, resets, "{vga} {arguments}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{vga} {arguments}: {said}");
         }
-        let failure = verdict(Machine::boot(&config));
-        assert_eq!(failure.verdict, Verdict::BootLoader { reset }, "{vga}");
-        assert!(failure.to_string().contains("display adapter"), "{failure}");
+    }
+}
+
+#[test]
+fn arguments_of_the_user_stand_beside_ours() {
+    let folder = tempfile::tempdir().unwrap();
+    let disk = folder.path().join("empty.img");
+    std::fs::write(&disk, vec![0; 1 << 20]).unwrap();
+    // A second disk does not boot first, and two accelerators would be an error.
+    let arguments = ["-M", "q35,accel=tcg", "-hda", disk.to_str().unwrap()];
+    let machine = boot_with(&arguments, Limits::default());
+    machine.leave().unwrap();
+}
+
+#[test]
+fn a_list_of_qemus_is_printed_and_no_failure() {
+    LazyLock::force(&READY);
+    for (arguments, words) in [
+        ("-machine help", "q35"),
+        ("-M help", "q35"),
+        ("-cpu help", "qemu64"),
+        ("-device help", "VGA"),
+        ("-device VGA,help", "vgamem_mb"),
+        ("-accel help", "tcg"),
+        ("-vga help", "cirrus"),
+        ("-display help", "none"),
+        ("-chardev help", "socket"),
+        ("-d help", "in_asm"),
+        ("-h", "-machine"),
+        ("--version", "QEMU emulator version"),
+    ] {
+        let mut all = vec!["--headless", "--"];
+        all.extend(arguments.split(' '));
+        let output = crystal_ball(&all);
+        let [printed, said] =
+            [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {said}");
+        assert!(printed.contains(words), "{arguments}: {printed}");
     }
 }
 
@@ -359,7 +478,7 @@ fn an_unknown_exit_is_qemus_failure_in_its_words() {
 #[test]
 fn a_killed_qemu_is_neither_success_nor_the_kernels_fault() {
     let mut machine = boot();
-    signal("KILL", machine.process());
+    send_signal(Signal::KILL, machine.process());
     let failure = verdict(
         machine
             .wait_until_running()
@@ -374,16 +493,14 @@ fn a_killed_qemu_is_neither_success_nor_the_kernels_fault() {
 #[test]
 fn a_qemu_ended_by_the_user_is_so_named() {
     let machine = boot();
-    signal("TERM", machine.process());
+    send_signal(Signal::TERM, machine.process());
     let failure = verdict(machine.watch());
     assert_eq!(failure.verdict, Verdict::User);
 }
 
-fn signal(name: &str, process: u32) {
-    let sent = Process::new("kill")
-        .args(["-s", name, &process.to_string()])
-        .status();
-    assert!(sent.unwrap().success());
+fn send_signal(signal: Signal, process: u32) {
+    let process = Pid::from_raw(process.cast_signed()).unwrap();
+    kill_process(process, signal).unwrap();
 }
 
 /// Runs the host program itself.
@@ -475,14 +592,22 @@ fn exit_codes_tell_the_verdicts_apart() {
 #[test]
 fn whatever_ends_the_program_ends_qemu() {
     LazyLock::force(&READY);
-    for (name, code) in [("INT", Some(130)), ("TERM", Some(130)), ("KILL", None)] {
+    for (signal, code) in [
+        (Signal::INT, Some(130)),
+        (Signal::TERM, Some(130)),
+        (Signal::KILL, None),
+    ] {
         let folder = tempfile::tempdir().unwrap();
         let pidfile = folder.path().join("pid");
+        // Its path is longer than a socket's may be.
+        let temporary = folder.path().join("t".repeat(120));
+        std::fs::create_dir(&temporary).unwrap();
         let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
         // A machine that never reaches the kernel: the program waits for it.
         program
             .args(["--headless", "--vga", "none", "--", "-pidfile"])
-            .arg(&pidfile);
+            .arg(&pidfile)
+            .env("TMPDIR", &temporary);
         let mut program = program.stderr(Stdio::null()).spawn().unwrap();
         let qemu = wait_for("QEMU's start", || {
             let pid = std::fs::read_to_string(&pidfile).ok()?;
@@ -490,9 +615,11 @@ fn whatever_ends_the_program_ends_qemu() {
                 .then(|| Path::new("/proc").join(pid.trim()))
         });
         assert!(qemu.exists());
-        signal(name, program.id());
-        assert_eq!(program.wait().unwrap().code(), code, "{name}");
+        send_signal(signal, program.id());
+        assert_eq!(program.wait().unwrap().code(), code, "{signal:?}");
         wait_for("QEMU's end", || (!qemu.exists()).then_some(()));
+        let left: Vec<_> = std::fs::read_dir(&temporary).unwrap().collect();
+        assert!(left.is_empty(), "{signal:?}: {left:?}");
     }
 }
 

@@ -1,12 +1,10 @@
 //! The serial line when it is bad: someone in the middle alters what the kernel says, or floods it.
 //!
-//! QEMU is real and so is the image. QEMU is started by a small script that gives it another
-//! socket for COM1; what comes there is passed on to the program, altered.
+//! QEMU is real and so is the image. What comes from QEMU is passed on to the program, altered.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::Shutdown;
-use std::os::unix::fs::PermissionsExt;
-use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
@@ -14,58 +12,37 @@ use std::time::Duration;
 
 use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::dump::Dump;
-use crystal_ball::machine::{Config, Machine, Verdict};
+use crystal_ball::machine::{Config, Limits, Machine, Verdict};
 use link::{Command, Content, Picture};
-use tempfile::TempDir;
 
 use crate::judged::{Judged, verdict};
-use crate::ready::{READY, config};
+use crate::ready::config;
 
 /// What becomes of a line of the kernel's, its end included.
 type Alter = Box<dyn FnMut(&[u8]) -> Vec<u8> + Send>;
 
-/// A machine whose serial line goes through `alter`, and the folder that it needs.
-fn tapped(arguments: Vec<String>, alter: Alter) -> (Machine, TempDir) {
-    let folder = tempfile::tempdir().unwrap();
-    let [kernel, host, script] = ["kernel", "host", "qemu"].map(|name| folder.path().join(name));
-    let listener = UnixListener::bind(&kernel).unwrap();
-    let qemu = &READY.qemu.path;
-    let text = format!(
-        "#!/bin/sh
-for argument do
-    shift
-    case $argument in socket,id=com1,path=*)
-        printf %s \"${{argument#*path=}}\" > '{}'
-        argument='socket,id=com1,path={}' ;;
-    esac
-    set -- \"$@\" \"$argument\"
-done
-exec '{}' \"$@\"
-",
-        host.display(),
-        kernel.display(),
-        qemu.display()
-    );
-    std::fs::write(&script, text).unwrap();
-    std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)).unwrap();
-    thread::spawn(move || pass_on(&listener, &host, alter));
+/// A machine whose serial line goes through `alter`.
+fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Machine {
     let config = Config {
-        qemu: script,
         arguments: arguments.into_iter().map(Into::into).collect(),
+        limits,
         ..config()
     };
-    let mut machine = Machine::boot(&config).expect("boots");
+    let tap = |kernel| {
+        let (tap, host) = UnixStream::pair().unwrap();
+        thread::spawn(move || pass_on(kernel, tap, alter));
+        host
+    };
+    let mut machine = Machine::boot_through(&config, tap).expect("boots");
     machine.show(&[Picture::Frame(480)]).expect("shows");
-    (machine, folder)
+    machine
 }
 
 /// The someone in the middle.
-fn pass_on(listener: &UnixListener, host: &Path, mut alter: Alter) {
-    let (kernel, _) = listener.accept().unwrap();
-    let host = UnixStream::connect(std::fs::read_to_string(host).unwrap()).unwrap();
+fn pass_on(kernel: UnixStream, mut host: UnixStream, mut alter: Alter) {
     let (mut from_host, mut to_kernel) = (host.try_clone().unwrap(), kernel.try_clone().unwrap());
     thread::spawn(move || std::io::copy(&mut from_host, &mut to_kernel));
-    let (mut kernel, mut host) = (BufReader::new(kernel), host);
+    let mut kernel = BufReader::new(kernel);
     let mut line = Vec::new();
     while matches!(kernel.read_until(b'\n', &mut line), Ok(1..)) {
         if host.write_all(&alter(&line)).is_err() {
@@ -82,6 +59,13 @@ fn pass_on(listener: &UnixListener, host: &Path, mut alter: Alter) {
 /// How a dump ends of which a line is altered. `alter` sees the lines from `line 100` on with
 /// their number.
 fn dump_altered(
+    alter: impl FnMut(usize, &[u8]) -> Vec<u8> + Send + 'static,
+) -> anyhow::Result<Dump> {
+    dump_altered_within(Limits::default(), alter)
+}
+
+fn dump_altered_within(
+    limits: Limits,
     mut alter: impl FnMut(usize, &[u8]) -> Vec<u8> + Send + 'static,
 ) -> anyhow::Result<Dump> {
     let mut number = None;
@@ -96,7 +80,7 @@ fn dump_altered(
             None => line.to_vec(),
         }
     });
-    let (mut machine, _folder) = tapped(Vec::new(), alter);
+    let mut machine = tapped(Vec::new(), limits, alter);
     let dump = machine.dump(Content::Page)?;
     machine.leave()?;
     Ok(dump)
@@ -212,7 +196,11 @@ fn line_ends_of_a_terminal_are_accepted() {
 
 #[test]
 fn a_hang_in_the_middle_of_a_dump_is_a_hang() {
-    let judged = judged(dump_altered(|_, _| Vec::new()));
+    let limits = Limits {
+        answer: Duration::from_secs(1),
+        ..Limits::default()
+    };
+    let judged = judged(dump_altered_within(limits, |_, _| Vec::new()));
     let waited_for = "the answer to 'dump'".into();
     assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }
@@ -233,7 +221,7 @@ fn a_crash_in_the_middle_of_a_dump_is_told_with_its_registers() {
         line.to_vec()
     };
     let arguments = vec!["-monitor".into(), monitor];
-    let (mut machine, _folder) = tapped(arguments, Box::new(alter));
+    let mut machine = tapped(arguments, Limits::default(), Box::new(alter));
     let judged = judged(machine.dump(Content::Page));
     let Verdict::Exception { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
@@ -267,7 +255,7 @@ fn a_host_that_stops_reading_is_waited_for() {
         }
         line.to_vec()
     };
-    let (mut machine, _folder) = tapped(Vec::new(), Box::new(alter));
+    let mut machine = tapped(Vec::new(), Limits::default(), Box::new(alter));
     let mut asked = Vec::new();
     for frame in 0..10 {
         asked.push(format!("show {frame}"));
@@ -361,4 +349,36 @@ fn a_flood_of_noise_changes_no_byte() {
         before
     );
     machine.leave().unwrap();
+}
+
+/// Lines without an end, none of which is the answer: the wait has an end all the same.
+#[test]
+fn a_flood_of_the_kernels_ends_in_a_hang() {
+    let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
+    let tap = |kernel: UnixStream| {
+        let (tap, host) = UnixStream::pair().unwrap();
+        let (mut flood, mut passed) = (tap.try_clone().unwrap(), tap);
+        let mut from_kernel = kernel.try_clone().unwrap();
+        thread::spawn(move || std::io::copy(&mut from_kernel, &mut passed));
+        thread::spawn(move || {
+            // It holds the line open, and asks the kernel nothing.
+            let _kernel = kernel;
+            let mut line = Vec::new();
+            link::write_line(format_args!("flood"), |bytes| line.extend_from_slice(bytes));
+            wait.recv().unwrap();
+            while flood.write_all(&line).is_ok() {}
+        });
+        host
+    };
+    let mut machine = Machine::boot_through(&config(), tap).unwrap();
+    // After this the kernel says nothing that could come between two lines of the flood.
+    machine.wait_until_running().unwrap();
+    machine.set_limits(Limits {
+        answer: Duration::from_millis(200),
+        ..Limits::default()
+    });
+    go.send(()).unwrap();
+    let judged = Judged(verdict(machine.answer("nothing")));
+    let waited_for = "the answer to 'nothing'".into();
+    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }

@@ -12,33 +12,33 @@
 //! a last screendump can be taken. Threads only read (serial, QMP, QEMU's words, its end) and
 //! feed one channel; everything is decided on the caller's thread.
 
+mod command;
 mod patience;
 mod qmp;
+mod run;
 mod verdict;
 
-use std::collections::VecDeque;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
-use std::os::unix::net::{UnixListener, UnixStream};
-use std::os::unix::process::CommandExt;
-use std::path::{Path, PathBuf};
-use std::process::{ExitStatus, Stdio};
+use std::os::fd::AsRawFd;
+use std::os::unix::net::UnixStream;
+use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
-use link::{
-    ADAPTER, Command, Content, END_OF_REPORT, ERROR, EXCEPTION, Exit, HELLO, LOADED, Lines, OK,
-    PANIC, REFUSED, RUNNING,
-};
-use rustix::process::{Pid, Signal, kill_process_group, test_kill_process};
+use link::{Command, Content, ERROR, LOADED, Lines, OK, RUNNING};
+use rustix::fs::MemfdFlags;
+use rustix::process::{Pid, Signal, kill_process_group};
 use serde_json::{Value, json};
-use tempfile::TempDir;
 
 use patience::Patience;
-pub use verdict::{Failure, Verdict};
+use qmp::Control;
+use run::{Act, Event, Run};
+use verdict::Evidence;
+pub use verdict::{Failure, Found, Verdict};
 
 use crate::card::Card;
 use crate::child;
@@ -61,15 +61,18 @@ pub struct Limits {
     pub boot: Duration,
     /// For each answer of the kernel and of QEMU, and for QEMU's end.
     pub answer: Duration,
+    /// For a user who has paused the machine while this program waits for an answer, by the clock.
+    pub pause: Duration,
 }
 
 impl Default for Limits {
     /// At least ten times what each takes on a quiet machine: 1.2 s for a boot (2.5 s from an IDE
-    /// disk), 1 s for a dump of all video memory.
+    /// disk), 1 s for a dump of all video memory. A pause may last an hour.
     fn default() -> Self {
         Self {
             boot: Duration::from_secs(20),
             answer: Duration::from_secs(10),
+            pause: Duration::from_secs(3600),
         }
     }
 }
@@ -113,105 +116,102 @@ impl Config {
 }
 
 /// A QEMU that runs our image. Dropping it ends QEMU.
+///
+/// Nothing of it has a name in the file system: its sockets are inherited, and its log and
+/// screendumps are files without a name. So nothing is left of it, whatever ends this program.
 #[derive(Debug)]
 pub struct Machine {
     events: Receiver<Event>,
     serial: UnixStream,
-    control: UnixStream,
+    control: Control,
     process: Pid,
-    /// The QEMU command line, the serial log, QEMU's words: kept on failure.
-    folder: TempDir,
+    arguments: Vec<OsString>,
+    evidence: Evidence,
     failures: PathBuf,
     limits: Limits,
-    seen: Seen,
-    lines: VecDeque<String>,
-    answers: VecDeque<Value>,
+    /// QEMU's time to end, once the machine is off.
+    ending: Option<Patience>,
+    run: Run,
 }
 
-/// What decides the verdict, as far as it is known.
-#[derive(Debug, Default)]
-struct Seen {
-    /// The kernel's first line.
-    hello: bool,
-    /// What the kernel said of its ramdisk's pack.
-    pack: Option<String>,
-    /// The kernel was asked to leave.
-    leaving: bool,
-    /// The window was told to pause the machine.
-    paused: bool,
-    /// Why QEMU says that the machine shut down.
-    shutdown: Option<String>,
-    /// The lines of a panic or exception.
-    report: Vec<String>,
-    /// QEMU's own words.
-    words: Vec<String>,
-    /// QEMU's end.
-    ended: Option<ExitStatus>,
-    /// Everything that the kernel said has been read.
-    serial_closed: bool,
+/// What QEMU printed in place of running the machine, because its arguments asked for that
+/// (`-machine help`). It is an error so that it ends whatever wanted a machine; it is no failure.
+#[derive(Debug)]
+pub struct Printed(pub String);
+
+impl std::fmt::Display for Printed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.0.trim_end())
+    }
 }
 
-enum Event {
-    Line(String),
-    Garbled(String),
-    Control(Value),
-    Words(String),
-    Ended(std::io::Result<ExitStatus>),
-    SerialClosed,
-}
+impl std::error::Error for Printed {}
 
 impl Machine {
     /// Starts QEMU and waits for the kernel's first line.
     ///
     /// # Errors
-    /// A [`Failure`] with the verdict, or why QEMU could not be started at all.
+    /// A [`Failure`] with the verdict; [`Printed`], if QEMU was asked for a list only; why QEMU
+    /// could not be started at all.
     pub fn boot(config: &Config) -> anyhow::Result<Self> {
-        if config
-            .arguments
-            .iter()
-            .any(|argument| argument == "-daemonize")
-        {
-            bail!("QEMU must stay this program's child, or nothing could end it: no -daemonize");
+        Self::boot_through(config, |serial| serial)
+    }
+
+    /// As [`Machine::boot`], with someone in the middle of the serial line: `tap` takes QEMU's
+    /// line and returns the one that is used in its place.
+    ///
+    /// # Errors
+    /// As [`Machine::boot`].
+    pub fn boot_through(
+        config: &Config,
+        tap: impl FnOnce(UnixStream) -> UnixStream,
+    ) -> anyhow::Result<Self> {
+        let daemonize =
+            |word: &OsString| word.to_str().and_then(command::option) == Some("daemonize");
+        if config.arguments.iter().any(daemonize) {
+            bail!(
+                "-daemonize: QEMU must stay this program's child, or nothing could end it; leave it out"
+            );
         }
-        let folder = tempfile::Builder::new()
-            .prefix("crystal-ball-")
-            .tempdir()
-            .context("no temporary folder for QEMU's sockets")?;
-        let control_socket = listen(&folder.path().join("qmp"))?;
-        let serial_socket = listen(&folder.path().join("serial"))?;
         let (send, events) = mpsc::channel();
-        let command = command_line(config, folder.path());
-        std::fs::write(
-            folder.path().join("command.txt"),
-            child::line(&command) + "\n",
-        )?;
-        let process = start(command, send.clone())?;
-        let accept = |socket, name| accept(socket, process, config.limits.answer, name);
-        let connected = accept(&control_socket, "its control socket")
-            .and_then(|control| Ok((control, accept(&serial_socket, "the serial line")?)));
-        let (control, serial) = match connected {
-            Ok(streams) => streams,
-            Err(error) => return Err(never_connected(error, process, &events, &folder, config)),
-        };
+        let arguments = command::arguments(config);
+        let started = command::start(&config.qemu, &arguments, send.clone())?;
+        let (control, serial) = (started.control, tap(started.serial));
+        // A reader that stands still must not keep this program from looking up.
+        control.set_write_timeout(Some(LOOK_UP))?;
+        serial.set_write_timeout(Some(LOOK_UP))?;
+        // A full disk costs the log, not the run.
+        let log = tempfile::tempfile().ok();
         read_control(control.try_clone()?, send.clone());
-        read_serial(serial.try_clone()?, folder.path(), send)?;
+        read_serial(
+            serial.try_clone()?,
+            log.as_ref().and_then(|log| log.try_clone().ok()),
+            send,
+        );
         let mut machine = Self {
             events,
             serial,
-            control,
-            process,
-            folder,
+            control: Control::new(control),
+            process: started.process,
+            arguments: config.arguments.clone(),
+            evidence: Evidence {
+                command: command::line(&config.qemu, &arguments),
+                serial: log,
+                screen: None,
+            },
             failures: config.failures.clone(),
             limits: config.limits,
-            seen: Seen::default(),
-            lines: VecDeque::new(),
-            answers: VecDeque::new(),
+            ending: None,
+            run: Run::default(),
         };
+        machine.run.asked_for_list = config.arguments.iter().any(|word| word == "help");
         machine.negotiate()?;
-        let mut patience = Patience::new(process, config.limits.boot);
-        while !machine.seen.hello {
+        let mut patience = Patience::new(machine.process, config.limits.boot);
+        while !machine.run.hello {
             if !machine.pump_or_wait(&mut patience)? {
-                return Err(machine.fail(Verdict::BootLoader { reset: false }));
+                let reset = machine.run.was_reset();
+                let found = Found::default();
+                return Err(machine.fail(Verdict::BootLoader { reset, found }));
             }
         }
         if let Some(pack) = config.pack {
@@ -223,7 +223,7 @@ impl Machine {
     /// Waits until the kernel has taken the pack of this checksum.
     fn wait_for_pack(&mut self, pack: u32) -> anyhow::Result<()> {
         let mut patience = Patience::new(self.process, self.limits.answer);
-        while self.seen.pack.is_none() {
+        while self.run.pack.is_none() {
             if !self.pump_or_wait(&mut patience)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: "what the kernel says of the model".into(),
@@ -241,7 +241,7 @@ impl Machine {
 
     /// What the kernel has said of its ramdisk's pack: that it was taken, or why it was refused.
     pub fn said_of_pack(&self) -> Option<&str> {
-        self.seen.pack.as_deref()
+        self.run.pack.as_deref()
     }
 
     /// QEMU's process.
@@ -255,8 +255,13 @@ impl Machine {
     /// A [`Failure`].
     pub fn wait_until_running(&mut self) -> anyhow::Result<()> {
         let mut patience = Patience::new(self.process, self.limits.answer);
-        while self.lines.pop_front().is_none_or(|line| line != RUNNING) {
-            if self.lines.is_empty() && !self.pump_or_wait(&mut patience)? {
+        while self
+            .run
+            .lines
+            .pop_front()
+            .is_none_or(|line| line != RUNNING)
+        {
+            if self.run.lines.is_empty() && !self.pump_or_wait(&mut patience)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: "the first picture".into(),
                 }));
@@ -265,24 +270,50 @@ impl Machine {
         Ok(())
     }
 
+    /// Changes the limits of all that is waited for from now on.
+    pub fn set_limits(&mut self, limits: Limits) {
+        self.limits = limits;
+    }
+
     /// Lets the show run for a while.
     ///
     /// # Errors
     /// A [`Failure`], if it ends meanwhile.
     pub fn rest(&mut self, time: Duration) -> anyhow::Result<()> {
         let by = Instant::now() + time;
-        while self.pump(by)? {}
+        while Instant::now() < by {
+            self.pump(by)?;
+        }
         Ok(())
     }
 
     /// Sends bytes as they are.
     ///
     /// # Errors
-    /// When the serial line is gone; what ended it is the better error, so that is looked for.
-    pub fn send_raw(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
-        if let Err(error) = self.serial.write_all(bytes) {
-            self.pump(Instant::now() + self.limits.answer)?;
-            return Err(error).context("the serial line does not take what is sent");
+    /// A [`Failure`]; a hang if the kernel does not read for too long.
+    pub fn send_raw(&mut self, mut bytes: &[u8]) -> anyhow::Result<()> {
+        let mut patience = Patience::new(self.process, self.limits.answer);
+        while !bytes.is_empty() {
+            match self.serial.write(bytes) {
+                Ok(count) => {
+                    bytes = &bytes[count..];
+                    patience.renew();
+                }
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {
+                    self.pump(Instant::now())?;
+                    if self.is_over(&mut patience) {
+                        return Err(self.fail(Verdict::Hang {
+                            waited_for: "the kernel's reading of what it is sent".into(),
+                        }));
+                    }
+                }
+                Err(error) => {
+                    // What has ended QEMU is the better error.
+                    self.rest(self.limits.answer)?;
+                    return Err(error).context("the serial line is closed");
+                }
+            }
         }
         Ok(())
     }
@@ -307,7 +338,7 @@ impl Machine {
         let mut patience = Patience::new(self.process, self.limits.answer);
         let mut answer = Vec::new();
         loop {
-            while let Some(line) = self.lines.pop_front() {
+            while let Some(line) = self.run.lines.pop_front() {
                 let closes = [OK, ERROR].contains(&first_word(&line));
                 // Said on its own, between answers.
                 if line != RUNNING {
@@ -357,21 +388,24 @@ impl Machine {
     /// # Errors
     /// A [`Failure`] for any other end.
     pub fn leave(mut self) -> anyhow::Result<()> {
-        self.seen.leaving = true;
+        self.run.leaving = true;
         self.send_line(&Command::Leave.to_string())?;
         self.run_to_the_end()
     }
 
     /// Lets the show run until the user ends it or it fails, and asks now and then whether the
-    /// kernel still lives. Always a [`Failure`] in the end: closing the window is one, by name.
+    /// kernel still lives, or QEMU, while the user has paused the machine. Always a [`Failure`] in
+    /// the end: closing the window is one, by name.
     ///
     /// # Errors
     /// The [`Failure`].
     pub fn watch(mut self) -> anyhow::Result<()> {
         loop {
             self.rest(HEARTBEAT)?;
-            self.lines.clear();
-            if !self.seen.paused {
+            self.run.lines.clear();
+            if self.run.paused.is_some() {
+                self.control("query-status", json!({}))?;
+            } else {
                 self.ask(Command::Counts)?;
             }
         }
@@ -401,22 +435,28 @@ impl Machine {
         }
     }
 
-    /// The host's words to QEMU: `execute` with `arguments`, and QEMU's answer.
+    /// Sends `execute` with `arguments` to QEMU, and returns QEMU's reply.
     fn control(&mut self, execute: &str, arguments: Value) -> anyhow::Result<Value> {
-        if let Err(error) = qmp::send(&mut self.control, execute, arguments) {
-            self.pump(Instant::now() + self.limits.answer)?;
-            return Err(error).context("QEMU's control socket is closed");
-        }
+        let id = match self.control.send(execute, arguments) {
+            Ok(id) => id,
+            Err(error) => {
+                // What has ended QEMU is the better error.
+                self.rest(self.limits.answer)?;
+                return Err(error).context("QEMU's control socket is closed");
+            }
+        };
         let mut patience = Patience::new(self.process, self.limits.answer);
         loop {
-            if let Some(answer) = self.answers.pop_front() {
-                return Ok(answer);
+            while let Some(reply) = self.run.replies.pop_front() {
+                if qmp::is_reply(&reply, id) {
+                    return Ok(reply);
+                }
             }
             if !self.pump_or_wait(&mut patience)? {
-                self.seen
-                    .words
-                    .push(format!("(it does not answer '{execute}')"));
-                return Err(self.judge());
+                let mut words = self.run.words.clone();
+                words.push(format!("(it does not answer '{execute}')"));
+                let status = self.run.ended;
+                return Err(self.fail(Verdict::Qemu { words, status }));
             }
         }
     }
@@ -425,20 +465,31 @@ impl Machine {
     fn negotiate(&mut self) -> anyhow::Result<()> {
         self.control("qmp_capabilities", json!({}))?;
         self.control("cont", json!({}))?;
+        self.run.started = true;
         Ok(())
     }
 
-    /// Takes in one event. False when `patience` is over before there was one; it does not run out
-    /// while the user has paused the machine, as QEMU's window can.
+    /// Takes in one event. False when `patience` is over before there was one, or when events have
+    /// come for far longer than that.
     fn pump_or_wait(&mut self, patience: &mut Patience) -> anyhow::Result<bool> {
         while !self.pump(Instant::now() + LOOK_UP)? {
-            if self.seen.paused {
-                patience.renew();
-            } else if patience.is_over() {
+            if self.is_over(patience) {
                 return Ok(false);
             }
         }
-        Ok(true)
+        Ok(!patience.is_past_ceiling())
+    }
+
+    /// Whether `patience` is over. A user's pause, as QEMU's window can make one, suspends it, but
+    /// has a limit of its own.
+    fn is_over(&self, patience: &mut Patience) -> bool {
+        match self.run.paused {
+            Some(since) => {
+                patience.renew();
+                since.elapsed() >= self.limits.pause
+            }
+            None => patience.is_over(),
+        }
     }
 
     /// Takes in one event. True if there was one before `by`.
@@ -450,6 +501,12 @@ impl Machine {
             if child::interrupted() {
                 return Err(child::Interrupted.into());
             }
+            if self.ending.as_mut().is_some_and(Patience::is_over) {
+                self.end();
+            }
+            if self.run.is_decided() {
+                return Err(self.judge());
+            }
             let wait = by.saturating_duration_since(Instant::now()).min(LOOK_UP);
             match self.events.recv_timeout(wait) {
                 Ok(event) => break event,
@@ -458,157 +515,146 @@ impl Machine {
                 Err(RecvTimeoutError::Disconnected) => return Err(self.judge()),
             }
         };
-        match event {
-            Event::Line(line) => self.take_line(line)?,
-            Event::Garbled(why) => return Err(self.fail(Verdict::Garbled { why })),
-            Event::Control(value) => self.take_control(value)?,
-            event => self.seen.note(event),
-        }
-        // What the kernel said last may still be on its way when QEMU has ended.
-        if self.seen.ended.is_some() && self.seen.serial_closed {
+        self.take(event);
+        if self.run.is_decided() {
             return Err(self.judge());
         }
         Ok(true)
     }
 
-    fn take_line(&mut self, line: String) -> anyhow::Result<()> {
-        let word = first_word(&line);
-        if word == HELLO {
-            if self.seen.hello {
-                return Err(self.fail(Verdict::TripleFault { booted: true }));
+    /// Takes in an event and does what it asks for.
+    fn take(&mut self, event: Event) {
+        // What cannot be sent goes to a QEMU that is ending: its end is the next event.
+        match self.run.take(event) {
+            Some(Act::Quit) => {
+                let _ = self.control.send("quit", json!({}));
+                self.ending = Some(Patience::new(self.process, self.limits.answer));
             }
-            self.seen.hello = true;
-            let spoken = format!("protocol {}", link::PROTOCOL);
-            if !line.ends_with(&spoken) {
-                return Err(anyhow!(
-                    "the kernel says '{line}'; this program speaks {spoken}"
-                ));
+            Some(Act::AskStatus) => {
+                let _ = self.control.send("query-status", json!({}));
             }
-        } else if [LOADED, REFUSED].contains(&word) {
-            self.seen.pack = Some(line);
-        } else if [PANIC, EXCEPTION, ADAPTER].contains(&word) || !self.seen.report.is_empty() {
-            let whole = line == END_OF_REPORT;
-            self.seen.report.push(line);
-            if whole {
+            Some(Act::Acknowledge) => {
                 self.keep_screen();
                 // The kernel waits for this byte before it ends QEMU.
                 let _ = self.serial.write_all(&[link::ACKNOWLEDGE]);
             }
-        } else {
-            self.lines.push_back(line);
+            None => {}
         }
-        Ok(())
-    }
-
-    fn take_control(&mut self, value: Value) -> anyhow::Result<()> {
-        match value.get("event").and_then(Value::as_str) {
-            None if value.get("QMP").is_some() => {}
-            None => self.answers.push_back(value),
-            Some("SHUTDOWN") => {
-                // The first reason counts: `quit` below is followed by a reason of its own.
-                let first = self.seen.shutdown.is_none();
-                let reason = value["data"]["reason"].as_str().unwrap_or("unknown");
-                let reason = self.seen.shutdown.get_or_insert(reason.to_string());
-                match reason.as_str() {
-                    // After a reset QEMU stands still.
-                    "guest-reset" => return Err(self.judge()),
-                    // `isa-debug-exit` ends QEMU 7.2 at once. QEMU 10 and later request a shutdown
-                    // in place of that, and `-no-shutdown` makes QEMU stand still. `quit` ends such
-                    // a QEMU with the exit code that the kernel wrote.
-                    "guest-shutdown" if first => {
-                        let _ = qmp::send(&mut self.control, "quit", json!({}));
-                    }
-                    // For the other reasons QEMU ends without a command.
-                    _ => {}
-                }
-            }
-            // After a shutdown the machine stands still because it is off: nobody paused it.
-            Some("STOP") => self.seen.paused = self.seen.shutdown.is_none(),
-            Some("RESUME") => self.seen.paused = false,
-            Some(_) => {}
-        }
-        Ok(())
     }
 
     /// The failure that an end, or a reset, amounts to.
     fn judge(&mut self) -> anyhow::Error {
-        let seen = &mut self.seen;
-        let exit = seen
-            .ended
-            .and_then(|status| status.code())
-            .and_then(Exit::from_code);
-        let verdict = match (exit, seen.shutdown.as_deref()) {
-            (Some(Exit::Left), _) if seen.leaving => return Left.into(),
-            (Some(Exit::Panic), _) => Verdict::Panic {
-                report: std::mem::take(&mut seen.report),
-            },
-            (Some(Exit::Exception), _) => Verdict::Exception {
-                report: std::mem::take(&mut seen.report),
-            },
-            (Some(Exit::Adapter), _) => Verdict::Adapter {
-                report: std::mem::take(&mut seen.report),
-            },
-            (_, Some("guest-reset")) if seen.hello => Verdict::TripleFault { booted: false },
-            (_, Some("guest-reset")) => Verdict::BootLoader { reset: true },
-            // SDL's window says host-ui when it is closed, GTK's quits as QMP would. This program
-            // sends `quit` only after a shutdown with another reason.
-            (_, Some("host-ui" | "host-qmp-quit" | "host-signal")) => Verdict::User,
-            _ => Verdict::Qemu {
-                words: std::mem::take(&mut seen.words),
-                status: seen.ended,
-            },
-        };
-        self.fail(verdict)
+        if let Some(text) = self.run.printed() {
+            return Printed(text).into();
+        }
+        match self.run.verdict() {
+            Ok(()) => Left.into(),
+            Err(verdict) => self.fail(verdict),
+        }
     }
 
     /// Ends QEMU and makes an error of the verdict, the evidence kept.
-    fn fail(&mut self, verdict: Verdict) -> anyhow::Error {
+    fn fail(&mut self, mut verdict: Verdict) -> anyhow::Error {
         if verdict == Verdict::User {
             return Failure::plain(verdict).into();
         }
-        if self.seen.ended.is_none() {
+        if let Verdict::BootLoader { found, .. } = &mut verdict {
+            *found = self.examine();
+        }
+        if self.run.ended.is_none() {
             self.keep_screen();
         }
         self.end();
-        Failure::keep(verdict, self.folder.path(), &self.failures).into()
+        Failure::keep(verdict, &self.evidence, &self.failures).into()
     }
 
-    /// Takes a last screendump, if QEMU still can. Whatever else happens meanwhile is too late to
-    /// change the verdict.
-    fn keep_screen(&mut self) {
-        let file = self.folder.path().join("screen.ppm");
-        let sent = qmp::send(&mut self.control, "screendump", json!({ "filename": file }));
+    /// What the machine is like, as far as QEMU still says.
+    fn examine(&mut self) -> Found {
+        let memory = self.request("query-memory-size-summary", json!({}));
+        let cpus = self.request("query-cpus-fast", json!({}));
+        let cpu = cpus.and_then(|cpus| Some(cpus[0]["qom-path"].as_str()?.to_string()));
+        let long_mode = cpu.and_then(|path| {
+            self.request("qom-get", json!({ "path": path, "property": "lm" }))?
+                .as_bool()
+        });
+        // 25 lines of 80 characters in the colour adapter's memory.
+        let text = json!({ "val": 0xB_8000, "size": 2 * 80 * 25 });
+        let text = self.request_file("pmemsave", text).unwrap_or_default();
+        Found {
+            memory: memory.and_then(|memory| memory["base-memory"].as_u64()),
+            long_mode,
+            arguments: self.arguments.clone(),
+            screen: verdict::text_lines(&text),
+        }
+    }
+
+    /// What QEMU returns to a command, if it still does, whatever else happens meanwhile: for the
+    /// evidence of a verdict that is certain.
+    fn request(&mut self, execute: &str, arguments: Value) -> Option<Value> {
+        let id = self.control.send(execute, arguments).ok()?;
         let by = Instant::now() + self.limits.answer;
-        while sent.is_ok()
-            && let Ok(event) = self
-                .events
-                .recv_timeout(by.saturating_duration_since(Instant::now()))
-        {
-            let answered = matches!(&event, Event::Control(value) if value.get("event").is_none());
-            self.seen.note(event);
-            if answered || self.seen.ended.is_some() {
-                break;
+        while self.run.ended.is_none() {
+            let wait = by.saturating_duration_since(Instant::now());
+            match self.events.recv_timeout(wait).ok()? {
+                Event::Control(mut reply) if qmp::is_reply(&reply, id) => {
+                    return reply.get_mut("return").map(Value::take);
+                }
+                event => self.take(event),
             }
         }
-        // Evidence that can't be kept must not hide the failure that it is about.
-        let _ = std::fs::read(&file)
-            .map_err(anyhow::Error::from)
-            .and_then(|bytes| Screen::from_ppm(&bytes))
-            .and_then(|screen| {
-                screen.write_png(File::create(self.folder.path().join("screen.png"))?)
-            });
+        None
+    }
+
+    /// The same for a command that writes a file.
+    fn request_file(&mut self, execute: &str, mut arguments: Value) -> Option<Vec<u8>> {
+        let mut file = Nameless::new().ok()?;
+        arguments["filename"] = file.path().into();
+        self.request(execute, arguments)?;
+        file.bytes().ok()
+    }
+
+    /// Takes a last screendump, if QEMU still can.
+    fn keep_screen(&mut self) {
+        let bytes = self.request_file("screendump", json!({}));
+        let screen = bytes.and_then(|bytes| Screen::from_ppm(&bytes).ok());
+        // The screen at the first report is the one to look at.
+        if self.evidence.screen.is_none() {
+            self.evidence.screen = screen;
+        }
     }
 
     /// Kills QEMU, if it has not ended, and waits until it has.
     fn end(&mut self) {
-        while self.seen.ended.is_none() {
+        while self.run.ended.is_none() {
             // QEMU, and all of it where --qemu names a script that starts one.
             let _ = kill_process_group(self.process, Signal::KILL);
             match self.events.recv_timeout(self.limits.answer) {
-                Ok(event) => self.seen.note(event),
+                Ok(event) => drop(self.run.take(event)),
                 Err(_) => return,
             }
         }
+    }
+}
+
+/// A file without a name, for QEMU to write into by way of this process.
+struct Nameless(File);
+
+impl Nameless {
+    fn new() -> anyhow::Result<Self> {
+        let file = rustix::fs::memfd_create("crystal-ball", MemfdFlags::CLOEXEC);
+        Ok(Self(file.context("no file in memory")?.into()))
+    }
+
+    /// A path that leads to it while this process lives.
+    fn path(&self) -> String {
+        format!("/proc/{}/fd/{}", std::process::id(), self.0.as_raw_fd())
+    }
+
+    /// What is in it.
+    fn bytes(&mut self) -> std::io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        self.0.read_to_end(&mut bytes)?;
+        Ok(bytes)
     }
 }
 
@@ -638,12 +684,12 @@ impl Card for Machine {
 
     /// By QEMU's `screendump`.
     fn screen(&mut self) -> anyhow::Result<Screen> {
-        let file = self.folder.path().join("screen.ppm");
-        let answer = self.control("screendump", json!({ "filename": file }))?;
-        if let Some(error) = answer.get("error") {
-            return Err(anyhow!("QEMU takes no screendump: {error}"));
+        let mut file = Nameless::new()?;
+        let reply = self.control("screendump", json!({ "filename": file.path() }))?;
+        if let Some(error) = reply.get("error") {
+            bail!("QEMU takes no screendump: {error}");
         }
-        let bytes = std::fs::read(&file).context("QEMU wrote no screendump")?;
+        let bytes = file.bytes().context("QEMU's screendump cannot be read")?;
         Screen::from_ppm(&bytes).context("QEMU's screendump is no picture")
     }
 }
@@ -651,19 +697,6 @@ impl Card for Machine {
 impl Drop for Machine {
     fn drop(&mut self) {
         self.end();
-    }
-}
-
-impl Seen {
-    /// Notes what an event says about QEMU itself.
-    fn note(&mut self, event: Event) {
-        match event {
-            Event::Words(line) => self.words.push(line),
-            Event::Ended(Ok(status)) => self.ended = Some(status),
-            Event::Ended(Err(error)) => self.words.push(error.to_string()),
-            Event::SerialClosed => self.serial_closed = true,
-            Event::Line(_) | Event::Garbled(_) | Event::Control(_) => {}
-        }
     }
 }
 
@@ -683,134 +716,6 @@ fn first_word(line: &str) -> &str {
     line.split(' ').next().unwrap_or("")
 }
 
-fn command_line(config: &Config, folder: &Path) -> std::process::Command {
-    // A comma in a path would end the option; QEMU reads two as one.
-    let path = |path: &Path| path.to_string_lossy().replace(',', ",,");
-    let mut qemu = child::command(&config.qemu);
-    qemu.args([
-        "-name",
-        "Crystal Ball",
-        "-accel",
-        "tcg",
-        "-net",
-        "none",
-        "-S",
-    ]);
-    qemu.args(["-vga", &config.vga, "-display", &config.display]);
-    // snapshot=on: writes go elsewhere, so a second QEMU is not stopped by the image's lock.
-    // if=virtio: the BIOS reads an IDE disk through a port, and waits for a thread of QEMU at every
-    // few sectors. A boot then takes twice the time alone, and ten times on a busy machine.
-    let drive = format!(
-        "if=virtio,format=raw,snapshot=on,file={}",
-        path(&config.image)
-    );
-    qemu.args(["-drive", &drive]);
-    for (id, socket) in [("qmp", "qmp"), ("com1", "serial")] {
-        let socket = format!("socket,id={id},path={}", path(&folder.join(socket)));
-        qemu.args(["-chardev", &socket]);
-    }
-    qemu.args([
-        "-mon",
-        "chardev=qmp,mode=control",
-        "-serial",
-        "chardev:com1",
-    ]);
-    let exit = format!("isa-debug-exit,iobase={:#x},iosize=4", Exit::PORT);
-    qemu.args(["-device", &exit, "-no-reboot", "-no-shutdown"]);
-    qemu.args(&config.arguments);
-    qemu
-}
-
-/// Starts QEMU on a thread that lives as long as it: the signal that ends QEMU with this program
-/// is tied to the thread that started it.
-fn start(mut command: std::process::Command, send: Sender<Event>) -> anyhow::Result<Pid> {
-    // A process group of its own: Ctrl-C is for this program, which then ends QEMU.
-    command
-        .process_group(0)
-        .stdin(Stdio::null())
-        .stdout(Stdio::null())
-        .stderr(Stdio::piped());
-    let (started, wait) = mpsc::channel();
-    thread::spawn(move || {
-        let mut child = match command.spawn() {
-            Ok(child) => child,
-            Err(error) => {
-                let _ = started.send(Err(error));
-                return;
-            }
-        };
-        let _ = started.send(Ok(Pid::from_child(&child)));
-        if let Some(words) = child.stderr.take() {
-            for line in BufReader::new(words).lines().map_while(Result::ok) {
-                let _ = send.send(Event::Words(line));
-            }
-        }
-        let _ = send.send(Event::Ended(child.wait()));
-    });
-    let started = wait.recv().context("the thread that starts QEMU is gone")?;
-    started.context("QEMU cannot be started")
-}
-
-fn listen(path: &Path) -> anyhow::Result<UnixListener> {
-    let listener =
-        UnixListener::bind(path).with_context(|| format!("no socket at {}", path.display()))?;
-    listener.set_nonblocking(true)?;
-    Ok(listener)
-}
-
-/// Waits for QEMU to connect, or to end.
-fn accept(
-    listener: &UnixListener,
-    process: Pid,
-    limit: Duration,
-    name: &str,
-) -> anyhow::Result<UnixStream> {
-    let mut patience = Patience::new(process, limit);
-    loop {
-        match listener.accept() {
-            Ok((stream, _)) => {
-                stream.set_nonblocking(false)?;
-                return Ok(stream);
-            }
-            Err(error) if error.kind() != ErrorKind::WouldBlock => return Err(error.into()),
-            Err(_) if child::interrupted() => return Err(child::Interrupted.into()),
-            Err(_) if test_kill_process(process).is_err() => {
-                bail!("it ended before it opened {name}")
-            }
-            Err(_) if patience.is_over() => bail!("it never opened {name}"),
-            Err(_) => thread::sleep(Duration::from_millis(2)),
-        }
-    }
-}
-
-/// What a QEMU amounts to that did not come as far as its sockets.
-fn never_connected(
-    error: anyhow::Error,
-    process: Pid,
-    events: &Receiver<Event>,
-    folder: &TempDir,
-    config: &Config,
-) -> anyhow::Error {
-    let _ = kill_process_group(process, Signal::KILL);
-    let mut seen = Seen::default();
-    while seen.ended.is_none()
-        && let Ok(event) = events.recv_timeout(config.limits.answer)
-    {
-        seen.note(event);
-    }
-    if error.is::<child::Interrupted>() {
-        return error;
-    }
-    if seen.words.is_empty() {
-        seen.words.push(error.to_string());
-    }
-    let verdict = Verdict::Qemu {
-        words: seen.words,
-        status: seen.ended,
-    };
-    Failure::keep(verdict, folder.path(), &config.failures).into()
-}
-
 fn read_control(stream: UnixStream, send: Sender<Event>) {
     thread::spawn(move || {
         for line in BufReader::new(stream).lines().map_while(Result::ok) {
@@ -825,15 +730,15 @@ fn read_control(stream: UnixStream, send: Sender<Event>) {
 ///
 /// Before the kernel's first line the firmware may have said anything; after it, every line has
 /// its checksum.
-fn read_serial(mut stream: UnixStream, folder: &Path, send: Sender<Event>) -> anyhow::Result<()> {
-    let mut log = File::create(folder.join("serial.log")).context("no log of the serial line")?;
+fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event>) {
     thread::spawn(move || {
         let (mut lines, mut greeted) = (Lines::new(), false);
         let mut bytes = [0; 4096];
         while let Ok(len @ 1..) = stream.read(&mut bytes) {
             let bytes = &bytes[..len];
-            // A full disk costs the log, not the run.
-            let _ = log.write_all(bytes);
+            if let Some(log) = &mut log {
+                let _ = log.write_all(bytes);
+            }
             for &byte in bytes {
                 let Some(line) = lines.push(byte) else {
                     continue;
@@ -852,5 +757,4 @@ fn read_serial(mut stream: UnixStream, folder: &Path, send: Sender<Event>) -> an
         }
         let _ = send.send(Event::SerialClosed);
     });
-    Ok(())
 }

@@ -14,7 +14,7 @@ use crystal_ball::diff;
 use crystal_ball::frames::Frames;
 use crystal_ball::golden;
 use crystal_ball::look::Look;
-use crystal_ball::machine::{Config, Failure, Machine, Verdict};
+use crystal_ball::machine::{Config, Failure, Machine, Printed, Verdict};
 use crystal_ball::model::{Files, Model};
 use crystal_ball::setup::{self, Options, Ready, say};
 use crystal_ball::{aside, child, record, replay, trade, window};
@@ -215,6 +215,11 @@ fn main() -> ExitCode {
     child::catch_interrupts();
     match run(cli) {
         Ok(code) => code,
+        Err(error) if error.is::<Printed>() => {
+            // Standard output that cannot be written was closed: nobody reads it.
+            let _ = writeln!(Output, "{error}");
+            ExitCode::SUCCESS
+        }
         Err(error) => {
             let mut message = format!("error: {error:#}");
             let code = if let Some(failure) = error.downcast_ref::<Failure>() {

@@ -1,12 +1,21 @@
 //! How a run ended, in words and as an exit code.
 
+use std::ffi::OsString;
 use std::fmt;
+use std::fs::{File, read_dir};
+use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::SystemTime;
 
-/// QEMU's command line, the serial log, and a last screendump.
-const EVIDENCE: [&str; 3] = ["command.txt", "serial.log", "screen.png"];
+use super::command::option;
+use crate::screen::Screen;
+
+/// The memory that the image boots with on every QEMU tried: 7.2 needs 25 MiB, 10 and later up to
+/// 32.
+const ENOUGH_MIB: u64 = 32;
+/// Options that put other firmware or another system in the image's place.
+const OTHER_FIRMWARE: [&str; 6] = ["bios", "boot", "kernel", "L", "option-rom", "pflash"];
 
 /// Failures whose evidence is kept; older ones are removed.
 const KEPT: usize = 20;
@@ -45,6 +54,8 @@ pub enum Verdict {
     BootLoader {
         /// The machine reset; otherwise nothing happened at all.
         reset: bool,
+        /// What the machine is like.
+        found: Found,
     },
     /// The serial line brought something that is not the kernel's.
     Garbled {
@@ -99,13 +110,10 @@ impl fmt::Display for Verdict {
             Self::Hang { waited_for } => {
                 write!(f, "the kernel hangs: {waited_for} did not come in time")
             }
-            Self::BootLoader { reset } => write!(
-                f,
-                "the boot loader {} before it reached the kernel. The usual reason is the display \
-                 adapter: the boot loader needs a VGA core with VESA modes, which `-vga std`, `cirrus`, \
-                 `vmware` and `virtio` have, and `-vga none`, `bochs-display`, `ramfb` and `ati-vga` lack",
-                if *reset { "reset the machine" } else { "stopped" }
-            ),
+            Self::BootLoader { reset, found } => {
+                let end = if *reset { "reset the machine" } else { "stopped" };
+                write!(f, "the boot loader {end} before it reached the kernel{found}")
+            }
             Self::Garbled { why } => write!(f, "the serial line is garbled: {why}"),
             Self::Qemu { words, status } => {
                 f.write_str("QEMU itself failed")?;
@@ -120,6 +128,90 @@ impl fmt::Display for Verdict {
             }
         }
     }
+}
+
+/// What a machine is like whose boot loader did not reach the kernel.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Bytes of memory, if QEMU said.
+    pub memory: Option<u64>,
+    /// Whether the CPU has long mode, if QEMU said.
+    pub long_mode: Option<bool>,
+    /// The user's arguments for QEMU.
+    pub arguments: Vec<OsString>,
+    /// The lines on a screen in text mode.
+    pub screen: Vec<String>,
+}
+
+impl Found {
+    /// What the image cannot boot with, and what to do about it.
+    fn causes(&self) -> Vec<String> {
+        let mut causes = Vec::new();
+        if let Some(bytes) = self.memory
+            && bytes < ENOUGH_MIB << 20
+        {
+            causes.push(format!(
+                "memory: the machine has {} MiB; give it at least {ENOUGH_MIB} (`-m {ENOUGH_MIB}`)",
+                bytes >> 20
+            ));
+        }
+        if self.long_mode == Some(false) {
+            causes.push(
+                "CPU: it has no long mode, and the kernel is 64-bit code; name a 64-bit CPU \
+                 (`-cpu qemu64`)"
+                    .into(),
+            );
+        }
+        for word in &self.arguments {
+            let word = word.to_string_lossy();
+            if option(&word).is_some_and(|name| OTHER_FIRMWARE.contains(&name)) {
+                causes.push(format!(
+                    "firmware: `{word}` may put other firmware or another system in the image's \
+                     place; leave it out"
+                ));
+            } else if word.contains("if=pflash") || word.contains("bootindex=") {
+                causes.push(format!(
+                    "disk: `{word}` may boot before the image; leave it out"
+                ));
+            }
+        }
+        causes
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let causes = self.causes();
+        write!(f, "{}", Indented(&causes))?;
+        if causes.is_empty() {
+            f.write_str(
+                "\n  display adapter: the boot loader needs a VGA core with VESA modes; `-vga std`, \
+                 `cirrus`, `vmware` and `virtio` have one, `-vga none`, `bochs-display`, `ramfb` and \
+                 `ati-vga` have none",
+            )?;
+        }
+        if self.screen.is_empty() {
+            return Ok(());
+        }
+        write!(f, "\n  its screen says:")?;
+        self.screen
+            .iter()
+            .try_for_each(|line| write!(f, "\n    {line}"))
+    }
+}
+
+/// The lines that VGA text memory shows: a character and its colours for each place, 80 in a line.
+/// Nothing, if that is no text: the memory may hold something else.
+pub fn text_lines(memory: &[u8]) -> Vec<String> {
+    let characters = memory.iter().step_by(2);
+    let is_text = |byte: u8| byte == 0 || (b' '..=b'~').contains(&byte);
+    if !characters.clone().all(|&byte| is_text(byte)) {
+        return Vec::new();
+    }
+    let characters: Vec<u8> = characters.map(|&byte| byte.max(b' ')).collect();
+    let lines = characters.chunks(80);
+    let lines = lines.map(|line| String::from_utf8_lossy(line).trim_end().to_string());
+    lines.filter(|line| !line.is_empty()).collect()
 }
 
 /// What to make of QEMU's words.
@@ -147,6 +239,42 @@ impl fmt::Display for Indented<'_> {
     }
 }
 
+/// What is kept of a run that failed.
+#[derive(Debug)]
+pub(super) struct Evidence {
+    /// QEMU's command line.
+    pub command: String,
+    /// Everything on the serial line, in a file without a name.
+    pub serial: Option<File>,
+    /// The last screendump.
+    pub screen: Option<Screen>,
+}
+
+impl Evidence {
+    /// Writes the evidence into a folder of its own under `failures`, and returns that folder.
+    fn keep(&self, failures: &Path) -> anyhow::Result<PathBuf> {
+        std::fs::create_dir_all(failures)?;
+        forget_oldest(failures);
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
+        let seconds = now.map_or(0, |now| now.as_secs());
+        let folder = tempfile::Builder::new()
+            .prefix(&format!("{seconds}-"))
+            .tempdir_in(failures)?
+            .keep();
+        std::fs::write(folder.join("command.txt"), &self.command)?;
+        if let Some(log) = &self.serial {
+            // By place: its writer shares the file's position.
+            let mut bytes = vec![0; log.metadata()?.len().try_into()?];
+            log.read_exact_at(&mut bytes, 0)?;
+            std::fs::write(folder.join("serial.log"), bytes)?;
+        }
+        if let Some(screen) = &self.screen {
+            screen.write_png(File::create(folder.join("screen.png"))?)?;
+        }
+        Ok(folder)
+    }
+}
+
 /// A verdict with its evidence.
 #[derive(Debug)]
 pub struct Failure {
@@ -165,34 +293,17 @@ impl Failure {
         }
     }
 
-    /// Moves the evidence from QEMU's temporary folder to one of its own under `failures`.
-    pub(super) fn keep(verdict: Verdict, folder: &Path, failures: &Path) -> Self {
-        let evidence = copy_evidence(folder, failures).ok();
+    /// Keeps the evidence in a folder under `failures`.
+    pub(super) fn keep(verdict: Verdict, evidence: &Evidence, failures: &Path) -> Self {
+        // Evidence that cannot be kept must not hide the failure that it is about.
+        let evidence = evidence.keep(failures).ok();
         Self { verdict, evidence }
     }
 }
 
-fn copy_evidence(folder: &Path, failures: &Path) -> std::io::Result<PathBuf> {
-    std::fs::create_dir_all(failures)?;
-    forget_oldest(failures);
-    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH);
-    let seconds = now.map_or(0, |now| now.as_secs());
-    let kept = tempfile::Builder::new()
-        .prefix(&format!("{seconds}-"))
-        .tempdir_in(failures)?
-        .keep();
-    for name in EVIDENCE {
-        match std::fs::copy(folder.join(name), kept.join(name)) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
-    }
-    Ok(kept)
-}
-
 /// Makes room for one more: the evidence of failures long mended should not fill a disk.
 fn forget_oldest(failures: &Path) {
-    let entries = std::fs::read_dir(failures).into_iter().flatten();
+    let entries = read_dir(failures).into_iter().flatten();
     let mut kept: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     // Their names begin with the time.
     kept.sort();
@@ -208,8 +319,9 @@ impl fmt::Display for Failure {
         write!(f, "{}", self.verdict)?;
         match &self.evidence {
             Some(folder) => {
-                let kept = EVIDENCE.iter().filter(|name| folder.join(name).exists());
-                let kept: Vec<_> = kept.copied().collect();
+                let kept = ["command.txt", "serial.log", "screen.png"].into_iter();
+                let kept = kept.filter(|name| folder.join(name).exists());
+                let kept: Vec<_> = kept.collect();
                 write!(f, "\nkept in {}: {}", folder.display(), kept.join(", "))
             }
             None => Ok(()),
@@ -218,3 +330,78 @@ impl fmt::Display for Failure {
 }
 
 impl std::error::Error for Failure {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(found: Found) -> String {
+        let reset = false;
+        Verdict::BootLoader { reset, found }.to_string()
+    }
+
+    #[test]
+    fn a_stop_in_the_boot_loader_names_what_was_found() {
+        let whole = Found {
+            memory: Some(128 << 20),
+            long_mode: Some(true),
+            ..Found::default()
+        };
+        let adapter = said(whole.clone());
+        assert!(adapter.contains("display adapter"), "{adapter}");
+        let with = |words: &[&str]| Found {
+            arguments: words.iter().map(OsString::from).collect(),
+            ..whole.clone()
+        };
+        for (found, words) in [
+            (
+                Found {
+                    memory: Some(16 << 20),
+                    ..whole.clone()
+                },
+                "has 16 MiB; give it at least 32",
+            ),
+            (
+                Found {
+                    long_mode: Some(false),
+                    ..whole.clone()
+                },
+                "no long mode",
+            ),
+            (with(&["-bios", "other.bin"]), "`-bios`"),
+            (with(&["--kernel", "vmlinuz"]), "`--kernel`"),
+            (with(&["-drive", "if=pflash,file=x"]), "`if=pflash,file=x`"),
+            (
+                with(&["-device", "ide-hd,drive=x,bootindex=0"]),
+                "boot before the image",
+            ),
+        ] {
+            let said = said(found);
+            assert!(said.contains(words), "{said}");
+            assert!(!said.contains("display adapter"), "{said}");
+        }
+        assert!(said(with(&["-m", "64"])).contains("display adapter"));
+    }
+
+    #[test]
+    fn text_memory_is_read_as_lines_or_not_at_all() {
+        let mut memory = [b' ', 7].repeat(80 * 25);
+        for (i, character) in b"No bootable device.".iter().enumerate() {
+            memory[2 * (160 + i)] = *character;
+        }
+        assert_eq!(text_lines(&memory), ["No bootable device."]);
+        let found = Found {
+            screen: text_lines(&memory),
+            ..Found::default()
+        };
+        let said = said(found);
+        assert!(
+            said.ends_with("its screen says:\n    No bootable device."),
+            "{said}"
+        );
+        assert_eq!(text_lines(&[0; 4000]), [""; 0]);
+        memory[0] = 0xFF;
+        assert_eq!(text_lines(&memory), [""; 0]);
+        assert_eq!(text_lines(&[]), [""; 0]);
+    }
+}

@@ -1,0 +1,201 @@
+//! QEMU's command line, and the start of its process.
+
+use std::ffi::OsString;
+use std::io::{BufRead, BufReader};
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::CommandExt;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::sync::mpsc::{self, Sender};
+use std::thread;
+
+use anyhow::Context;
+use link::Exit;
+use rustix::process::Pid;
+
+use super::Config;
+use super::run::Event;
+use crate::child;
+
+/// QEMU's ends of the sockets, as its command line names them.
+const CONTROL: i32 = 3;
+const SERIAL: i32 = 4;
+
+/// Moves the sockets from standard input and output to [`CONTROL`] and [`SERIAL`].
+///
+/// The standard library hands a child no other descriptors than the standard ones. A descriptor
+/// that every child inherits would also reach the children of other threads, and a socket's end
+/// would then not be seen.
+const MOVE_SOCKETS: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >&2"#;
+
+/// The option that names an accelerator on its own.
+const ACCELERATOR_OPTIONS: [&str; 4] = ["accel", "enable-kvm", "enable-hax", "enable-hvf"];
+
+/// QEMU's arguments.
+pub fn arguments(config: &Config) -> Vec<OsString> {
+    let mut words: Vec<OsString> = Vec::new();
+    let mut add = |more: &[&str]| words.extend(more.iter().map(OsString::from));
+    add(&["-name", "Crystal Ball", "-net", "none", "-S"]);
+    // QEMU takes the first `-accel` that works, so ours must not stand before the user's.
+    if !names_accelerator(&config.arguments) {
+        add(&["-accel", "tcg"]);
+    }
+    add(&["-vga", &config.vga, "-display", &config.display]);
+    // readonly=on: no lock stops a second QEMU, and QEMU makes no temporary file.
+    let image = format!(
+        "if=none,id=crystal-ball,format=raw,readonly=on,file={}",
+        escaped(&config.image)
+    );
+    // virtio: the BIOS reads an IDE disk through a port, and waits for a thread of QEMU at every
+    // few sectors. A boot then takes twice the time alone, and ten times on a busy machine.
+    // bootindex=1: the user's other disks, which have none, do not boot before the image.
+    let disk = "virtio-blk-pci,drive=crystal-ball,bootindex=1";
+    add(&["-drive", &image, "-device", disk]);
+    let control = format!("socket,id=crystal-ball-qmp,fd={CONTROL}");
+    let serial = format!("socket,id=crystal-ball-com1,fd={SERIAL}");
+    add(&["-chardev", &control, "-qmp", "chardev:crystal-ball-qmp"]);
+    add(&["-chardev", &serial, "-serial", "chardev:crystal-ball-com1"]);
+    let exit = format!("isa-debug-exit,iobase={:#x},iosize=4", Exit::PORT);
+    add(&["-device", &exit, "-no-reboot", "-no-shutdown"]);
+    words.extend(config.arguments.iter().cloned());
+    words
+}
+
+/// A path as the value of a QEMU option: QEMU reads two commas as one.
+fn escaped(path: &Path) -> String {
+    path.to_string_lossy().replace(',', ",,")
+}
+
+/// The name of an option, without its dashes: QEMU takes one or two.
+pub fn option(word: &str) -> Option<&str> {
+    word.strip_prefix("--").or_else(|| word.strip_prefix('-'))
+}
+
+/// Whether the arguments name an accelerator, in any of QEMU's spellings.
+fn names_accelerator(arguments: &[OsString]) -> bool {
+    let words: Vec<_> = arguments
+        .iter()
+        .map(|word| word.to_string_lossy())
+        .collect();
+    words.iter().enumerate().any(|(at, word)| {
+        let value = words.get(at + 1).map_or("", |value| value.as_ref());
+        match option(word) {
+            Some("machine" | "M") => value.split(',').any(|part| part.starts_with("accel=")),
+            Some(name) => ACCELERATOR_OPTIONS.contains(&name),
+            None => false,
+        }
+    })
+}
+
+/// The host's ends of a started QEMU.
+pub struct Started {
+    pub process: Pid,
+    pub control: UnixStream,
+    pub serial: UnixStream,
+}
+
+/// Starts QEMU on a thread that lives as long as QEMU: the signal that ends QEMU with this program
+/// is tied to the thread that started it. That thread sends QEMU's words and its end.
+pub fn start(qemu: &Path, arguments: &[OsString], send: Sender<Event>) -> anyhow::Result<Started> {
+    let (control, qemu_control) = UnixStream::pair().context("no socket for QEMU")?;
+    let (serial, qemu_serial) = UnixStream::pair().context("no socket for QEMU")?;
+    let mut command = child::command("sh");
+    command.args(["-c", MOVE_SOCKETS, "sh"]);
+    command.arg(qemu).args(arguments);
+    // A process group of its own: Ctrl-C is for this program, which then ends QEMU.
+    command
+        .process_group(0)
+        .stdin(OwnedFd::from(qemu_control))
+        .stdout(OwnedFd::from(qemu_serial))
+        .stderr(Stdio::piped());
+    let (started, wait) = mpsc::channel();
+    thread::spawn(move || {
+        let spawned = command.spawn();
+        // It holds QEMU's ends of the sockets: their other ends would never be closed.
+        drop(command);
+        let mut child = match spawned {
+            Ok(child) => child,
+            Err(error) => {
+                let _ = started.send(Err(error));
+                return;
+            }
+        };
+        let _ = started.send(Ok(Pid::from_child(&child)));
+        if let Some(words) = child.stderr.take() {
+            for line in BufReader::new(words).lines().map_while(Result::ok) {
+                let _ = send.send(Event::Words(line));
+            }
+        }
+        let _ = send.send(Event::Ended(child.wait()));
+    });
+    let started = wait.recv().context("the thread that starts QEMU is gone")?;
+    Ok(Started {
+        process: started.context("QEMU cannot be started")?,
+        control,
+        serial,
+    })
+}
+
+/// The command line as a shell reads it.
+pub fn line(qemu: &Path, arguments: &[OsString]) -> String {
+    child::line(Command::new(qemu).args(arguments)) + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn config(arguments: &[&str]) -> Config {
+        Config {
+            qemu: "qemu".into(),
+            image: "a,b.img".into(),
+            vga: "std".into(),
+            display: "none".into(),
+            pack: None,
+            arguments: arguments.iter().map(OsString::from).collect(),
+            failures: "failures".into(),
+            limits: Default::default(),
+        }
+    }
+
+    #[test]
+    fn accelerator_of_the_user_replaces_ours() {
+        let ours = |arguments: &[&str]| {
+            let words = super::arguments(&config(arguments));
+            words.windows(2).any(|pair| pair == ["-accel", "tcg"])
+        };
+        for named in [
+            &["-accel", "kvm"][..],
+            &["--accel", "kvm"],
+            &["-accel", "tcg,thread=single"],
+            &["-enable-kvm"],
+            &["--enable-kvm"],
+            &["-machine", "pc,accel=kvm"],
+            &["--machine", "accel=kvm:tcg"],
+            &["-m", "64", "-M", "q35,accel=tcg"],
+            &["-machine", "q35", "-machine", "accel=xen"],
+        ] {
+            assert!(!ours(named), "{named:?}");
+        }
+        for unnamed in [
+            &[][..],
+            &["-machine", "q35"],
+            &["-M", "q35,smm=off"],
+            &["-name", "accel=kvm"],
+            &["-cpu", "max"],
+            &["-machine"],
+        ] {
+            assert!(ours(unnamed), "{unnamed:?}");
+        }
+    }
+
+    #[test]
+    fn command_line_holds_the_users_arguments_last_and_escapes_the_path() {
+        let words = super::arguments(&config(&["-m", "64"]));
+        assert_eq!(words[words.len() - 2..], ["-m", "64"]);
+        let line = line(Path::new("qemu"), &words);
+        assert!(line.starts_with("qemu -name 'Crystal Ball' "), "{line}");
+        assert!(line.contains("file=a,,b.img "), "{line}");
+    }
+}
