@@ -13,6 +13,7 @@ use std::time::{Duration, Instant};
 
 use crystal_ball::model::{obj, solid, texture};
 use fastrand::Rng;
+use in_place::InPlace;
 use modex::PlanarBuffer;
 use pack::{Arena, MAX_BYTES, Pack, Parts};
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
@@ -37,8 +38,8 @@ impl Drop for Case {
 
 /// What is drawn on, kept from case to case.
 struct Room {
-    arena: Box<Arena>,
-    storage: Box<Storage>,
+    arena: InPlace<Arena>,
+    storage: InPlace<Storage>,
     painted: Box<[u8; MAX_TEXELS]>,
     page: Box<PlanarBuffer>,
 }
@@ -46,8 +47,8 @@ struct Room {
 impl Room {
     fn new() -> Self {
         Self {
-            arena: Box::default(),
-            storage: Box::default(),
+            arena: in_place::boxed!(Arena),
+            storage: in_place::boxed!(Storage),
             painted: Box::new([0; MAX_TEXELS]),
             page: Box::new(PlanarBuffer::new()),
         }

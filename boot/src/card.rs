@@ -8,6 +8,7 @@
 
 use anyhow::{Context, anyhow, bail};
 use emulator::Vga;
+use in_place::InPlace;
 use link::dump::{Header, PLANE_BYTES};
 use link::{Command, Content, ERROR, Motion, OK, Picture, Word};
 use pack::Pack;
@@ -19,13 +20,10 @@ use crate::indexed::widen;
 use crate::look::Look;
 use crate::screen::Screen;
 
-/// The program's memory, empty.
-///
-/// A call of its own: a build that is not optimised makes it on the stack first, some megabytes, and a
-/// function with several such places has room for all of them at once.
-#[inline(never)]
-pub fn memory() -> Box<Memory> {
-    Box::new(Memory::new())
+/// Returns empty memory for the program. It is built in place: about 4 MiB are more than a thread's stack
+/// holds.
+pub fn memory() -> InPlace<Memory> {
+    in_place::boxed!(Memory)
 }
 
 /// A card with a show on it.

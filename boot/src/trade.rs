@@ -127,7 +127,7 @@ pub fn run(
     setup: setup::Options,
     model: Option<&Pack<'_>>,
 ) -> anyhow::Result<PathBuf> {
-    let mut arena = Box::new(Arena::new());
+    let mut arena = in_place::boxed!(Arena);
     let model = model.map(|pack| pack.entry(&mut arena));
     let out = match &options.out {
         Some(out) => out.clone(),
@@ -502,7 +502,7 @@ mod tests {
         let effort = Effort { slice: 1 };
         fs::create_dir(out.path().join("pictures")).unwrap();
         let model = Model::new(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n", None).unwrap();
-        let mut arena = Box::new(Arena::new());
+        let mut arena = in_place::boxed!(Arena);
         let model = model.pack().entry(&mut arena);
         let scenes = ["tilted", "wall", model.name];
         let found = measure(&scenes, Some(&model), &mappers, 1, effort);

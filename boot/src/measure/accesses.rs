@@ -7,6 +7,7 @@
 use anyhow::{bail, ensure};
 use cost::{Ask, Bench, Clock, Memory, Work};
 use emulator::Vga;
+use in_place::InPlace;
 use modex::{Bus, Counted, Tally};
 use texmap::{Mapper, Order};
 
@@ -24,10 +25,18 @@ pub struct Accesses {
 }
 
 /// What the benches on the emulated card borrow.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Memories {
-    counted: Box<Memory>,
-    plain: Box<Memory>,
+    counted: InPlace<Memory>,
+    plain: InPlace<Memory>,
+}
+
+impl Default for Memories {
+    fn default() -> Self {
+        let counted = in_place::boxed!(Memory);
+        let plain = counted.clone();
+        Self { counted, plain }
+    }
 }
 
 /// The measuring kernel's works on the emulated card, with counters and without.

@@ -131,7 +131,7 @@ pub fn with_entry<T>(entry: &Entry<'_>, look: impl FnOnce(&Subject<'_>) -> T) ->
 /// Makes a subject of a scene at some poses, and lends it.
 pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     let textures = entry.paint(&mut texels);
     let mut stage = Stage::new(&mut storage, entry.scene(&textures));
     let about = entry.about.to_string();
@@ -141,7 +141,7 @@ pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subje
 /// The colours and the texture of a scene, and a mesh of its own.
 fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     let entry = Entry::parse("tilted").expect("it is in the catalogue");
     let textures = entry.paint(&mut texels);
     let (vertices, corners, faces) = random_mesh(seed);

@@ -41,7 +41,7 @@ pub struct Clock {
 
 /// The fixed memory of the bench, zeros at first. About 2.5 MiB: meant for a static, which then takes
 /// no room in an image.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Memory {
     ball: [u8; scene::TEXELS],
     storage: Storage,

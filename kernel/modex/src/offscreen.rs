@@ -10,7 +10,7 @@ use crate::{Destination, HEIGHT, Lane, Line, PlanarBuffer};
 /// bytes at once, a plane after the other.
 ///
 /// [`ModeX::present`]: crate::ModeX::present
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Offscreen {
     page: PlanarBuffer,
     drawn: Drawn,

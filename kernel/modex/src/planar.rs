@@ -7,7 +7,7 @@ use crate::driver::check_lane;
 use crate::{Destination, HEIGHT, Lane, Line, PAGE_BYTES, STRIDE, WIDTH};
 
 /// Four planes of one page: pixel (x, y) is `planes[x & 3][80 y + x / 4]`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub struct PlanarBuffer {
     /// The planes.
     pub planes: [[u8; PAGE_BYTES]; 4],

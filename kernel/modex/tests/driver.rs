@@ -324,9 +324,7 @@ fn page(recorder: &Recorder, page: usize) -> PlanarBuffer {
 
 #[test]
 fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    let mut random = fastrand::Rng::with_seed(seed);
+    let mut random = seeded::generator();
     let background: [u8; HEIGHT] = std::array::from_fn(|y| y as u8 | 1);
     let mut recorder = Recorder::new();
     let mut offscreen = Box::new(Offscreen::new());
@@ -484,7 +482,7 @@ fn a_row_takes_one_mask_and_one_store_a_pixel() {
         let mut card = ModeX::set(Counted::new(&mut recorder), &BLACK).unwrap();
         let mut expected = PlanarBuffer::new();
         expected.clear(&background);
-        let mut flat = expected.clone();
+        let mut flat = expected;
         // Pixel by pixel, as a column of one: what a row has to come to.
         for (x, colour) in (x..x + len).zip(100u16..) {
             expected.column(x, y, 1, |pixel| pixel.fill(|| colour as u8));
@@ -535,7 +533,7 @@ fn a_row_of_a_line_takes_a_mask_a_plane_and_one_store_a_pixel() {
     for (x, y, len) in rows() {
         let mut expected = PlanarBuffer::new();
         expected.clear(&background);
-        let (mut flat, mut offscreen) = (expected.clone(), Offscreen::new());
+        let (mut flat, mut offscreen) = (expected, Offscreen::new());
         for (x, colour) in (x..x + len).zip(100u16..) {
             expected.column(x, y, 1, |pixel| pixel.fill(|| colour as u8));
         }
@@ -671,9 +669,7 @@ fn every_write_is_counted_once_for_its_purpose() {
 /// and touches no other.
 #[test]
 fn a_window_shows_its_columns_and_nothing_else() {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    let mut random = fastrand::Rng::with_seed(seed);
+    let mut random = seeded::generator();
     for _ in 0..300 {
         let width = random.u16(1..=WIDTH as u16);
         let first = random.u16(0..=WIDTH as u16 - width);

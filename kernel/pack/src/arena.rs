@@ -5,7 +5,7 @@ use scene::{Corner, Face, MAX_VERTICES, Vec3};
 use crate::{MAX_ALL_CORNERS, MAX_FACES};
 
 /// Room for the largest mesh. About half a MiB: meant for a static.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Arena {
     pub(crate) vertices: [Vec3; MAX_VERTICES],
     pub(crate) corners: [Corner; MAX_ALL_CORNERS],

@@ -426,7 +426,7 @@ mod tests {
     fn a_scene_comes_back() {
         let bytes = cube();
         let pack = Pack::parse(&bytes).unwrap();
-        let mut arena = Box::new(Arena::new());
+        let mut arena = in_place::boxed!(Arena);
         let entry = pack.entry(&mut arena);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
         let textures = entry.paint(&mut painted);
@@ -564,9 +564,9 @@ mod tests {
         parts.write(|part| bytes.extend_from_slice(part));
         assert!((MAX_BYTES * 3 / 4..=MAX_BYTES).contains(&bytes.len()));
         let pack = Pack::parse(&bytes).unwrap();
-        let mut arena = Box::new(Arena::new());
+        let mut arena = in_place::boxed!(Arena);
         let entry = pack.entry(&mut arena);
-        let mut storage = Box::new(Storage::new());
+        let mut storage = in_place::boxed!(Storage);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
         let textures = entry.paint(&mut painted);
         let mut stage = Stage::new(&mut storage, entry.scene(&textures));

@@ -506,7 +506,7 @@ mod tests {
         let entry = Entry::parse(name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
         let textures = entry.paint(&mut texels);
-        let mut storage = Box::new(Storage::new());
+        let mut storage = in_place::boxed!(Storage);
         check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
     }
 

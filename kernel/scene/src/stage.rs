@@ -48,7 +48,7 @@ pub struct Scene<'a, 't> {
 }
 
 /// The fixed arenas that drawing works in.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Storage {
     surfaces: [u8; SURFACE_BYTES],
     points: [Point; MAX_VERTICES],

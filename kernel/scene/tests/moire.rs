@@ -21,7 +21,7 @@ fn on_stage<T>(name: &str, look: impl FnOnce(&Entry<'_>, &mut Stage<'_>) -> T) -
     let entry = Entry::parse(name).unwrap();
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = entry.paint(&mut texels);
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     look(entry, &mut Stage::new(&mut storage, entry.scene(&textures)))
 }
 

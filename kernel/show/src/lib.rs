@@ -50,7 +50,7 @@ fn lower_mark(lowered: u32) -> &'static str {
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
 /// The fixed memory of the program. About 2.5 MiB: meant for a static.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Memory {
     model: Arena,
     texels: [u8; MAX_TEXELS],

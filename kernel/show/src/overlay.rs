@@ -98,7 +98,7 @@ impl Column {
 }
 
 /// Writing on the screen, a bit a pixel. About 20 KiB, all zeros when empty.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Writing {
     plain: [Column; WIDTH],
     bright: [Column; WIDTH],

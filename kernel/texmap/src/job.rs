@@ -504,7 +504,7 @@ impl Coordinates {
 }
 
 /// A list of at most `N` jobs, without a heap.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct JobList<const N: usize> {
     jobs: [Job; N],
     len: usize,
@@ -630,9 +630,7 @@ mod tests {
     /// Later jobs lie over earlier ones: no chain may turn them about, and none may lose one.
     #[test]
     fn every_plane_has_its_jobs_in_the_order_in_which_they_came() {
-        let seed = fastrand::u64(..);
-        std::println!("seed {seed}");
-        let mut random = fastrand::Rng::with_seed(seed);
+        let mut random = seeded::generator();
         let mut list = JobList::<40>::new();
         for _ in 0..1000 {
             list.clear();

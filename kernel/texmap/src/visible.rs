@@ -150,7 +150,7 @@ impl Spans {
 }
 
 /// The faces of one picture, at most `FACES`, and where each of them is seen.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub struct Visible<const FACES: usize> {
     columns: [Spans; WIDTH],
     /// Columns that are being changed are copied from here.

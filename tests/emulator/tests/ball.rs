@@ -10,7 +10,7 @@ fn every_picture_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
     let mut texels = Box::new([0; scene::TEXELS]);
     let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     let mut stage = Stage::new(&mut storage, scene);
     let mut card = ModeX::set(Counted::new(Vga::new()), scene.palette).unwrap();
     let mut columns = 0;

@@ -6,6 +6,7 @@ use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use fastrand::Rng;
+use in_place::InPlace;
 use modex::{Destination, HEIGHT, Lane, Palette, PlanarBuffer, STRIDE, WIDTH};
 use scene::{
     Corner, FOCAL_LENGTH, Face, LIGHT_LEVELS, LightTable, Mesh, NEAR, Pose, Scene, Stage, Storage,
@@ -559,12 +560,23 @@ impl std::ops::AddAssign for Compared {
 const SNAPPED: f64 = 1.0 / 128.0;
 
 /// Checks cases; it has the memory for that.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Checker {
-    storage: Box<Storage>,
+    storage: InPlace<Storage>,
     front: Count,
     back: Count,
     covered: Pixels,
+}
+
+impl Default for Checker {
+    fn default() -> Self {
+        Self {
+            storage: in_place::boxed!(Storage),
+            front: Count::default(),
+            back: Count::default(),
+            covered: Pixels::default(),
+        }
+    }
 }
 
 impl Checker {

@@ -125,7 +125,7 @@ mod tests {
         let entry = CATALOGUE.iter().find(|entry| entry.name == name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
         let textures = entry.paint(&mut texels);
-        let mut storage = Box::new(Storage::new());
+        let mut storage = in_place::boxed!(Storage);
         check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
     }
 

@@ -335,7 +335,7 @@ mod tests {
         for entry in &CATALOGUE {
             let mut texels = Box::new([0; MAX_TEXELS]);
             let textures = entry.paint(&mut texels);
-            let mut storage = Box::new(Storage::new());
+            let mut storage = in_place::boxed!(Storage);
             check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
         }
     }

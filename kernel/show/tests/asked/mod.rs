@@ -1,6 +1,7 @@
 //! A show on the emulated card, asked on its serial line.
 
 use emulator::Vga;
+use in_place::InPlace;
 use link::write_line;
 use show::{Memory, Show};
 
@@ -24,6 +25,6 @@ pub fn done(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
 }
 
 /// The memory of a show, empty.
-pub fn memory() -> Box<Memory> {
-    Box::new(Memory::new())
+pub fn memory() -> InPlace<Memory> {
+    in_place::boxed!(Memory)
 }

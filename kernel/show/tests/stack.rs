@@ -1,0 +1,43 @@
+//! How much stack the program takes on the host.
+
+mod asked;
+
+use std::thread;
+
+use asked::done;
+use emulator::Vga;
+use show::Show;
+
+/// A quarter of what a thread has by default.
+const STACK: usize = 512 << 10;
+
+/// The program's memory is built in place, so a thread's stack is enough for all that the program does.
+#[test]
+fn a_small_stack_is_enough() {
+    let work = || {
+        let mut memory = asked::memory();
+        let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
+        for name in ["info", "help", "quality", "split"] {
+            show.present(1, &mut |_| {});
+            done(&mut show, &format!("steer {name}"), 1);
+        }
+        for scene in ["ball", "cube", "knot"] {
+            for order in ["polygons", "buffer"] {
+                for line in [
+                    "hold".into(),
+                    format!("scene {scene}"),
+                    format!("order {order}"),
+                    "mapper within-1/256".into(),
+                    "show 7 motion 01000000 00000000 00000000 00000000".into(),
+                    "dump".into(),
+                    "checksums all".into(),
+                    "log".into(),
+                ] {
+                    done(&mut show, &line, 0);
+                }
+            }
+        }
+    };
+    let thread = thread::Builder::new().stack_size(STACK).spawn(work);
+    thread.unwrap().join().unwrap();
+}
