@@ -160,7 +160,7 @@ fn compare_coverage(
 fn every_golden_is_what_the_oracle_draws() {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = CATALOGUE[0].paint(&mut texels);
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     let mut stage = Stage::new(&mut storage, CATALOGUE[0].scene(&textures));
     let mut between = 0;
     for golden in golden::find(&golden::folder()).unwrap() {
@@ -205,9 +205,7 @@ fn every_golden_is_what_the_oracle_draws() {
 /// near plane. No pixel further than 1/128 from a true edge may change sides.
 #[test]
 fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    let mut random = fastrand::Rng::with_seed(seed);
+    let mut random = seeded::generator();
     let mut checker = Checker::default();
     let ball = Solid::ball();
     let mut compare = |solid: &Solid, pose: &Pose| {

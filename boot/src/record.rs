@@ -246,9 +246,7 @@ mod tests {
 
     #[test]
     fn a_gif_is_the_pictures_and_lasts_as_long() {
-        let seed = fastrand::u64(..);
-        println!("seed {seed}");
-        let mut random = fastrand::Rng::with_seed(seed);
+        let mut random = seeded::generator();
         let palette: Vec<_> = (0..=255u8).map(|i| [i / 4, i % 64, i / 8]).collect();
         let mut picture = Indexed {
             width: 20,

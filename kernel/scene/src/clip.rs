@@ -267,8 +267,8 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::MAX_CORNERS;
+    use std::vec;
     use std::vec::Vec;
-    use std::{eprintln, vec};
     use texmap::affine::Sides;
     use texmap::{Texture, coverage};
 
@@ -304,12 +304,6 @@ mod tests {
         });
         legal.unwrap_or_else(|dropped| panic!("{dropped:?}: {polygon:?}"));
         pixels
-    }
-
-    fn random() -> fastrand::Rng {
-        let seed = fastrand::u64(..);
-        eprintln!("seed {seed}");
-        fastrand::Rng::with_seed(seed)
     }
 
     /// All sizes alike, from 1 to the largest.
@@ -412,7 +406,7 @@ mod tests {
     /// place in the texture included, in every face that has the edge, walked either way.
     #[test]
     fn every_face_of_an_edge_is_left_with_the_same_piece_of_it() {
-        let mut random = random();
+        let mut random = seeded::generator();
         let (mut clipped, mut twice) = (0, 0);
         for _ in 0..200_000 {
             let [a, b, c, d] = [0; 4].map(|_| view(&mut random));
@@ -435,7 +429,7 @@ mod tests {
 
     #[test]
     fn what_is_left_is_legal_wherever_the_corners_were() {
-        let mut random = random();
+        let mut random = seeded::generator();
         let mut most = 0;
         for _ in 0..100_000 {
             // A convex face: a ring about a middle, in a random plane.
@@ -481,7 +475,7 @@ mod tests {
             ]
         };
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let mut random = random();
+        let mut random = seeded::generator();
         let (mut seen, mut hidden, mut by_near) = (0, 0, 0);
         for _ in 0..700 {
             let views = [0; 3].map(|_| view(&mut random));

@@ -5,16 +5,10 @@ use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::solid::{Checker, Compared, Count, Mix, Solid, length, pose};
 use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Storage, Vec3};
 
-fn random() -> fastrand::Rng {
-    let seed = fastrand::u64(..);
-    eprintln!("seed {seed}");
-    fastrand::Rng::with_seed(seed)
-}
-
 #[test]
 fn at_every_distance_nothing_is_dropped() {
-    let mut random = random();
-    let mut storage = Box::new(Storage::new());
+    let mut random = seeded::generator();
+    let mut storage = in_place::boxed!(Storage);
     let unit = 1 << 16;
     for solid in [
         Solid::ball(),
@@ -43,8 +37,7 @@ fn at_every_distance_nothing_is_dropped() {
 
 /// Tries so many cases of a mix; panics with a test to paste.
 fn sweep(mix: Mix, cases: u64) -> Compared {
-    let seed = fastrand::u64(..);
-    eprintln!("seed {seed}");
+    let seed = seeded::generator().get_seed();
     let mut checker = Checker::default();
     let mut compared = Compared::default();
     for number in 0..cases {
@@ -96,7 +89,7 @@ fn cut_faces_are_where_lines_of_sight_meet_them() {
 
 #[test]
 fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     let unit = 1 << 16;
     let cube = Solid::cuboid([unit; 3]);
     let mut count = Count::default();
@@ -122,7 +115,7 @@ fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
 
 #[test]
 fn beyond_the_limits_all_is_dropped_and_counted() {
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     let cube = Solid::cuboid([1 << 16; 3]);
     let mut count = Count::default();
     for (distance, dropped) in [
@@ -151,7 +144,7 @@ fn beyond_the_limits_all_is_dropped_and_counted() {
 /// Such a face is no legal one; it must do no harm.
 #[test]
 fn a_zigzag_that_clipping_gives_too_many_corners_is_dropped_and_counted() {
-    let mut storage = Box::new(Storage::new());
+    let mut storage = in_place::boxed!(Storage);
     for (corners, dropped) in [(3, 0), (5, 0), (MAX_CORNERS, 1)] {
         let vertices: Vec<Vec3> = (0..corners as i32)
             .map(|i| {
@@ -184,8 +177,11 @@ fn meshes_that_clipping_has_no_room_for_are_refused() {
     let far = |extent: i32| Solid::cuboid([extent, 1, 1]);
     let accepted = |solid: &Solid| {
         let solid = solid.clone();
-        std::panic::catch_unwind(move || solid.on_stage(&mut Box::new(Storage::new()), |_| ()))
-            .is_ok()
+        std::panic::catch_unwind(move || {
+            let mut storage = in_place::boxed!(Storage);
+            solid.on_stage(&mut storage, |_| ());
+        })
+        .is_ok()
     };
     let corners = MAX_CORNERS as u16;
     for (solid, legal) in [

@@ -7,10 +7,8 @@ use texmap::{Mapper, Order};
 
 /// At every pixel the nearest face, written once, in `poses` poses by each of some mappers.
 fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    let mut random = fastrand::Rng::with_seed(seed);
-    let mut storage = Box::new(Storage::new());
+    let mut random = seeded::generator();
+    let mut storage = in_place::boxed!(Storage);
     for (name, solid, distances) in models(&mut random) {
         let (mut pixels, mut contested, mut ties, mut borders) = (0, 0, 0, 0);
         for &(mapper, order) in mappers.iter().cycle().take(poses * mappers.len()) {
@@ -49,8 +47,9 @@ fn it_is_so_by_every_mapper_in_every_order() {
     let mappers: Vec<_> = all
         .map(|(i, &(_, mapper, _))| (mapper, Order::ALL[i % 2].1))
         .collect();
+    let mut random = seeded::generator();
     for part in mappers.chunks(8) {
-        hidden(1, &[part[fastrand::usize(..part.len())]]);
+        hidden(1, &[part[random.usize(..part.len())]]);
     }
 }
 

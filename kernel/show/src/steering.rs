@@ -502,12 +502,6 @@ mod tests {
     use std::vec::Vec;
     use texmap::Texture;
 
-    fn random() -> fastrand::Rng {
-        let seed = fastrand::u64(..);
-        std::println!("seed {seed}");
-        fastrand::Rng::with_seed(seed)
-    }
-
     /// A catalogue's scene, as it moves by itself.
     fn own(number: usize) -> State<'static> {
         State::of(Scenes::new(None), CATALOGUE[number])
@@ -534,7 +528,7 @@ mod tests {
     /// Taking up what has come together, at any tick, changes no pose after it.
     #[test]
     fn a_pose_does_not_depend_on_when_it_was_looked_at() {
-        let mut random = random();
+        let mut random = seeded::generator();
         for _ in 0..200 {
             let mut state = own(random.usize(..CATALOGUE.len()));
             let mut tick = random.u32(..);
@@ -573,7 +567,7 @@ mod tests {
                 assert!((0..=Pose::MAX_DISTANCE).contains(&pose.distance));
             }
         }
-        let mut random = random();
+        let mut random = seeded::generator();
         let mut state = own(0);
         for tick in 0..20_000 {
             act(&mut state, tick, any(&mut random));
@@ -747,7 +741,7 @@ mod tests {
 
     #[test]
     fn a_log_knows_the_state_at_every_tick_until_it_is_full() {
-        let mut random = random();
+        let mut random = seeded::generator();
         let mut notes = Box::new(Log::NOTES);
         let start = own(0);
         let mut log = Log::new(start, &mut notes);

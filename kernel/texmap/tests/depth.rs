@@ -164,7 +164,7 @@ fn level_triangle(random: &mut fastrand::Rng, wall: bool, upright: bool) -> Tria
 
 #[test]
 fn a_wall_and_a_floor_are_exact_but_for_drift() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let (mut pixels, mut walls, mut affine, mut exact, mut worst) = (0, 0, 0, 0, 0f64);
     for case in 0..240 {
         let (wall, upright) = (case % 2 == 0, case % 3 == 0);
@@ -203,7 +203,7 @@ fn a_wall_and_a_floor_are_exact_but_for_drift() {
 
 #[test]
 fn where_no_depth_is_constant_level_is_exact() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let texels = texels(SIZE.0, SIZE.1);
     let texture = Texture::padded(&texels, SIZE.0, SIZE.1).unwrap();
     let mut planes = 0;
@@ -233,7 +233,7 @@ fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64
 
 #[test]
 fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewhere() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let (mut pixels, mut worst, mut ways) = (0, [0f64; 2], [0; 4]);
     for case in 0..160 {
         let mut triangle = Triangle::any(&mut random, [0.1, 1.0, 4.0][case % 3]);
@@ -270,7 +270,7 @@ fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewher
 /// so a line that goes along rows or columns has none.
 #[test]
 fn a_free_line_without_slope_goes_through_the_centres() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     for case in 0..100 {
         let triangle = level_triangle(&mut random, case % 2 == 0, false);
         compare(Mapper::Free, QUARTER, &triangle, |_, _, _, _, _| {
@@ -289,7 +289,7 @@ fn linear(plane: &Plane, k: usize, (x, y): (f64, f64), (to_x, to_y): (f64, f64))
 
 #[test]
 fn tiles_are_off_by_what_their_edge_and_their_column_are_and_by_that_somewhere() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let (mut pixels, mut affine, mut exact, mut worst) = (0, 0, 0, 0f64);
     for case in 0..160 {
         // Without a change of depth only fixed point is left.
@@ -342,7 +342,7 @@ fn tiles_are_off_by_what_their_edge_and_their_column_are_and_by_that_somewhere()
 
 #[test]
 fn nearer_goes_the_way_in_which_depth_changes_less() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let texels = texels(SIZE.0, SIZE.1);
     let texture = Texture::padded(&texels, SIZE.0, SIZE.1).unwrap();
     let mut ways = [0; 2];
@@ -367,7 +367,7 @@ fn nearer_goes_the_way_in_which_depth_changes_less() {
 /// Any polygon with any plane, seen or not: no fault, each pixel once, every texel the texture's.
 #[test]
 fn whatever_the_plane_is_coverage_stays_and_every_texel_is_inside() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let mut pixels = 0;
     for case in 0..500 {
         let size = [(1, 1), (256, 256), (256, 1), (3, 100)][case % 4];
@@ -432,7 +432,7 @@ fn on_the_horizon_and_beyond_it_nothing_is_at_fault() {
 
 #[test]
 fn plane_by_plane_they_draw_what_they_draw_polygon_by_polygon() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let texels = texels(SIZE.0, SIZE.1);
     let texture = Texture::padded(&texels, SIZE.0, SIZE.1).unwrap();
     for case in 0..30 {

@@ -8,16 +8,9 @@ use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING};
 /// Cases of each mix: half a second of what `cargo sweep --only texels` does.
 const CASES: u64 = 1500;
 
-fn generator() -> fastrand::Rng {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    fastrand::Rng::with_seed(seed)
-}
-
 #[test]
 fn every_texel_is_the_floor_of_the_quotient() {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
+    let seed = seeded::generator().get_seed();
     let mut checker = Checker::default();
     for mix in Mix::ALL {
         let (mut samples, mut clamped, mut ties) = (0, 0, 0);
@@ -56,7 +49,7 @@ fn every_texel_is_the_floor_of_the_quotient() {
 /// what the denominator is off times the quotient.
 #[test]
 fn cutting_the_plane_moves_no_form_by_more_than_its_bound() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let (mut samples, mut worst) = (0u32, 0f64);
     for _ in 0..200_000 {
         let anchors = [(); 3].map(|()| anchor(&mut random, 7, 24, (256, 256)));
@@ -85,7 +78,7 @@ fn cutting_the_plane_moves_no_form_by_more_than_its_bound() {
 
 #[test]
 fn a_corner_of_the_polygon_has_its_own_coordinates() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     for _ in 0..10_000 {
         let mut anchors = [(); 3].map(|()| anchor(&mut random, 14, 20, (256, 256)));
         // The first of them on a pixel's centre.

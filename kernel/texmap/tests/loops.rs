@@ -20,12 +20,6 @@ const MASKED: [Loop; 3] = [Loop::Shifts, Loop::Joined, Loop::Extract];
 type Draw = fn(Loop, &Texture<'_>, Walk, Column<'_>);
 const DRAWS: [(&str, Draw); 2] = [("column", Loop::column), ("portable", Loop::portable)];
 
-fn random(name: &str) -> fastrand::Rng {
-    let seed = fastrand::u64(..);
-    println!("{name}: seed {seed}");
-    fastrand::Rng::with_seed(seed)
-}
-
 fn texels(random: &mut fastrand::Rng, len: usize) -> Vec<u8> {
     (0..len).map(|_| random.u8(UNTOUCHED + 1..)).collect()
 }
@@ -166,7 +160,7 @@ impl Page {
         };
         Self {
             place: (0, 0),
-            drawn: untouched.clone(),
+            drawn: untouched,
             expected: untouched,
         }
     }
@@ -181,7 +175,7 @@ impl Page {
 
 #[test]
 fn every_loop_draws_its_clear_twin() {
-    let random = &mut random("twins");
+    let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut page = Page::new();
     for case in 0..4000 {
@@ -206,7 +200,7 @@ fn every_loop_draws_its_clear_twin() {
 /// the fraction it would seem to have one at every pixel.
 #[test]
 fn a_negative_whole_step_carries_nothing() {
-    let random = &mut random("whole steps");
+    let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut page = Page::new();
     for pitch in 0..=8 {
@@ -244,7 +238,7 @@ fn a_negative_whole_step_carries_nothing() {
 
 #[test]
 fn masked_loops_wrap_any_walk_around_the_padding() {
-    let random = &mut random("wrap-around");
+    let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut page = Page::new();
     for case in 0..4000 {
@@ -274,7 +268,7 @@ fn masked_loops_wrap_any_walk_around_the_padding() {
 
 #[test]
 fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
-    let random = &mut random("outside");
+    let random = &mut seeded::generator();
     let texels = all_texels(random);
     for case in 0..200 {
         let texture = texture(&texels, (side(random), side(random)), random.bool());
@@ -316,7 +310,7 @@ fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
 /// A packed walk is off by a bit more at every pixel, and no further outside than it was.
 #[test]
 fn a_packed_walk_drifts_within_its_bound() {
-    let random = &mut random("drift");
+    let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut worst = 0;
     for _ in 0..20_000 {
@@ -351,7 +345,7 @@ fn a_packed_walk_drifts_within_its_bound() {
 /// The registers' spare bits are counted for the longest column that there can be.
 #[test]
 fn the_longest_column_spills_nothing() {
-    let random = &mut random("longest");
+    let random = &mut seeded::generator();
     let texels = all_texels(random);
     let texture = texture(&texels, (256, 256), true);
     let len = u16::MAX;
@@ -417,7 +411,7 @@ fn an_empty_column_is_not_drawn() {
 /// Whole faces by name: what a job draws is what it says that it reads.
 #[test]
 fn jobs_say_what_every_loop_reads() {
-    let random = &mut random("jobs");
+    let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut drifted = 0;
     for _ in 0..60 {

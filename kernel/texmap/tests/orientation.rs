@@ -83,9 +83,7 @@ fn on_a_border(corners: &Corners, centre: Place) -> bool {
 /// Pixels, those of them that are other ones when turned though no border is near, and those on a
 /// border.
 fn compare(by: Mapper, cases: usize) -> [u32; 3] {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    let mut random = fastrand::Rng::with_seed(seed);
+    let mut random = seeded::generator();
     let (mut pixels, mut others, mut ties) = (0, 0, 0);
     for case in 0..cases {
         // Whole pixels and halves of them bring ties.

@@ -14,7 +14,7 @@ const ROWS: [Rows; 3] = [Rows::Multiply, Rows::Steps, Rows::Passes];
 /// plane that a row touches.
 #[test]
 fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let texels = texels(100, 64);
     let texture = Texture::padded(&texels, 100, 64).unwrap();
     let (mut one, mut begins, mut ends) = (0, [0; 4], [0; 4]);
@@ -78,7 +78,7 @@ fn half_steps(polygon: &[Vertex], texture: &Texture<'_>, axis: Axis) -> Vec<Step
 /// Half a pixel's worth of texture along the run, and the step's last bit for each pixel of it.
 #[test]
 fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let texels = [0; 256 * 128];
     let texture = Texture::new(&texels, 256, 128).unwrap();
     for axis in [Axis::Right, Axis::Down] {

@@ -4,7 +4,7 @@
 mod random;
 
 use modex::PlanarBuffer;
-use random::{COLUMNS, DEEP_COLUMNS, any, generator, off, seen, side};
+use random::{COLUMNS, DEEP_COLUMNS, any, off, seen, side};
 use texmap::bounds::Bend;
 use texmap::coverage::Axis;
 use texmap::plane;
@@ -49,7 +49,7 @@ fn pixels(job: &Job, texture: &Texture<'_>) -> Vec<(i32, i32)> {
 
 #[test]
 fn a_quotient_is_less_than_it_should_be_by_below_a_unit_and_three_128ths() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let mut most = 0f64;
     for _ in 0..2_000_000 {
         let bits = random.u32(1..=55);
@@ -70,7 +70,7 @@ fn a_quotient_is_less_than_it_should_be_by_below_a_unit_and_three_128ths() {
 
 #[test]
 fn a_step_is_cut_towards_zero() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     for steps in 1..=319u16 {
         let largest = (1 << 24) - 1;
         let n = i32::from(steps);
@@ -93,7 +93,7 @@ fn a_step_is_cut_towards_zero() {
 
 #[test]
 fn what_is_drawn_are_the_texels_of_the_coordinates() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let texels: Vec<u8> = (0..1 << 16).map(|_| random.u8(..)).collect();
     let (mut page, mut planes) = (PlanarBuffer::new(), PlanarBuffer::new());
     let mut compared = 0;
@@ -147,7 +147,7 @@ fn what_is_drawn_are_the_texels_of_the_coordinates() {
 /// pixel too soon or too late.
 #[test]
 fn pieces_meet_at_their_quotients_and_the_run_ends_at_its_own() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let texture = Texture::new(&[0; 256 * 256], 256, 256).unwrap();
     for _ in 0..5_000 {
         let len = random.u16(1..=240);
@@ -290,7 +290,7 @@ fn measure(columns: u32, mapper: (&str, Pieces, bool), random: &mut fastrand::Rn
 }
 
 fn measure_all(columns: u32) {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let named = MAPPERS
         .iter()
         .filter(|(name, ..)| Mapper::parse(name).is_some());

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 
 use oracle::coverage::inside;
-use random::{COLUMNS, DEEP_COLUMNS, generator, off, side};
+use random::{COLUMNS, DEEP_COLUMNS, off, side};
 use texmap::adaptive::{EXACT, LENGTHS, PIECE, Pieces};
 use texmap::bounds::{Affine, Bend};
 use texmap::coverage::{self, Axis};
@@ -242,7 +242,7 @@ fn none_cheaper(
 /// Either way, no pixel of any face is further off than the tolerance, and no way that was taken is
 /// dearer than another.
 fn within(least: u32, tolerance: &str) {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let tolerance = Tolerance::parse(tolerance).unwrap();
     let mut ways = [BTreeMap::new(), BTreeMap::new()];
     let (mut worst, mut pixels, mut runs) = (0f64, [0u64; 2], [0; 2]);
@@ -370,7 +370,7 @@ fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>
 /// The axis is found from a polygon's corners. How near that comes to what all of its runs say.
 #[test]
 fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     for tolerance in ["1", "1/4", "1/16"] {
         let tolerance = Tolerance::parse(tolerance).unwrap();
         let (mut count, mut rows, mut sums) = (0, 0, [0; 3]);
@@ -428,7 +428,7 @@ fn a_million_affine_columns_keep_to_their_closed_form() {
 }
 
 fn affine(least: u32) {
-    let mut random = generator();
+    let mut random = seeded::generator();
     let (mut tightest, mut sum, mut count) = (0f64, 0f64, 0u32);
     let mut held: Option<(Vec<Vertex>, Affine, texmap::affine::Sides)> = None;
     columns(least, &mut random, |face, plane, texture, run| {
@@ -507,7 +507,7 @@ fn names_say_the_error() {
 /// The faces of these tests cover the pixels that their polygons do.
 #[test]
 fn a_run_is_inside_its_polygon() {
-    let mut random = generator();
+    let mut random = seeded::generator();
     columns(2_000, &mut random, |face, _, _, run| {
         let points: Vec<Point> = face.polygon.iter().map(|&vertex| vertex.into()).collect();
         assert!(inside(&points, run.line.into(), run.first.into()));

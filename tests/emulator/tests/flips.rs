@@ -140,7 +140,7 @@ fn the_other_order_tears_when_an_interrupt_comes_before_the_write() {
 fn pages_rotate_unseen_whatever_interrupts() {
     let mut random = seeded::generator();
     for case in 0..seeded::cases(12) {
-        let latch = LATCHES[case as usize % 3];
+        let latch = LATCHES[case % 3];
         let mut card = ModeX::set(Vga::new(), &BLACK).unwrap();
         card.bus().set_latch(latch);
         card.bus().finish_frame();

@@ -9,12 +9,6 @@ use texmap::{Face, Job, JobList, Mapper, Order, Renderer, Stats, Texture, Vertex
 pub const FOCAL_LENGTH: i32 = 258;
 const BACKGROUND: [u8; HEIGHT] = [0; HEIGHT];
 
-pub fn generator() -> fastrand::Rng {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    fastrand::Rng::with_seed(seed)
-}
-
 /// Texels of a padded texture, none of them the background's colour.
 pub fn texels(width: u16, height: u16) -> Vec<u8> {
     let len = Texture::padded_len(width, height);

@@ -10,13 +10,6 @@ pub const COLUMNS: u32 = 100_000;
 /// Those of the deep ones.
 pub const DEEP_COLUMNS: u32 = 1_000_000;
 
-/// A generator, its seed printed.
-pub fn generator() -> fastrand::Rng {
-    let seed = fastrand::u64(..);
-    println!("seed {seed}");
-    fastrand::Rng::with_seed(seed)
-}
-
 /// A side of a texture: powers of two and not, 1, the largest.
 pub fn side(random: &mut fastrand::Rng) -> u16 {
     match random.u8(0..4) {
