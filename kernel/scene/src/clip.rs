@@ -408,7 +408,7 @@ mod tests {
     fn every_face_of_an_edge_is_left_with_the_same_piece_of_it() {
         let mut random = seeded::generator();
         let (mut clipped, mut twice) = (0, 0);
-        for _ in 0..200_000 {
+        for _ in 0..seeded::cases(200_000) {
             let [a, b, c, d] = [0; 4].map(|_| view(&mut random));
             let edge = placed(&[a, b]);
             for face in [&[a, b, c][..], &[b, a, d], &[c, b, a, d]] {
@@ -424,14 +424,17 @@ mod tests {
             clipped += u32::from(!edge.is_empty() && a | b != 0);
             twice += u32::from(!edge.is_empty() && a != 0 && b != 0);
         }
-        assert!(clipped > 20_000 && twice > 1000, "{clipped}, {twice}");
+        assert!(
+            !seeded::is_whole() || clipped > 20_000 && twice > 1000,
+            "{clipped}, {twice}"
+        );
     }
 
     #[test]
     fn what_is_left_is_legal_wherever_the_corners_were() {
         let mut random = seeded::generator();
         let mut most = 0;
-        for _ in 0..100_000 {
+        for _ in 0..seeded::cases(100_000) {
             // A convex face: a ring about a middle, in a random plane.
             let corners = random.usize(3..=MAX_CORNERS);
             let [middle, p, q] = [0; 3].map(|_| view(&mut random).map(|k| k / 3));
@@ -459,7 +462,7 @@ mod tests {
                 }
             }
         }
-        assert!(most > MAX_CORNERS, "{most}");
+        assert!(!seeded::is_whole() || most > MAX_CORNERS, "{most}");
     }
 
     /// Against lines of sight and the unrounded triangle: only a pixel within 1/128 of a true edge
@@ -477,7 +480,7 @@ mod tests {
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let mut random = seeded::generator();
         let (mut seen, mut hidden, mut by_near) = (0, 0, 0);
-        for _ in 0..700 {
+        for _ in 0..seeded::cases(700) {
             let views = [0; 3].map(|_| view(&mut random));
             if views.iter().all(|&view| Point::new(view).outside == 0) {
                 continue;
@@ -516,7 +519,7 @@ mod tests {
             }
         }
         assert!(
-            seen > 500_000 && hidden > 500_000 && by_near > 5_000,
+            !seeded::is_whole() || seen > 500_000 && hidden > 500_000 && by_near > 5_000,
             "{seen}, {hidden}, {by_near}"
         );
     }

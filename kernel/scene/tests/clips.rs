@@ -18,7 +18,7 @@ fn at_every_distance_nothing_is_dropped() {
         Solid::cuboid([1; 3]),
     ] {
         for solid in [solid.clone(), solid.inside_out()] {
-            for i in 0..1500 {
+            for i in 0..seeded::cases(1500) {
                 let distance = match i % 3 {
                     0 => random.i32(0..=Pose::MAX_DISTANCE),
                     1 => length(&mut random) * 2,
@@ -36,11 +36,11 @@ fn at_every_distance_nothing_is_dropped() {
 }
 
 /// Tries so many cases of a mix; panics with a test to paste.
-fn sweep(mix: Mix, cases: u64) -> Compared {
+fn sweep(mix: Mix, cases: usize) -> Compared {
     let seed = seeded::generator().get_seed();
     let mut checker = Checker::default();
     let mut compared = Compared::default();
-    for number in 0..cases {
+    for number in 0..seeded::cases(cases) as u64 {
         let case = mix.case(seed, number);
         compared += checker.case(&case).unwrap_or_else(|wrong| {
             let from = format_args!("mix {mix:?}, seed {seed}, case {number}");
@@ -70,7 +70,7 @@ fn from_inside_a_crag_each_pixel_is_written_once() {
 fn closed_solids_have_no_gap_from_outside_and_no_double_but_in_a_fold() {
     for mix in [Mix::Ball, Mix::Cube, Mix::Octahedron] {
         let compared = sweep(mix, 300);
-        assert!(compared.pixels > 200_000);
+        assert!(!seeded::is_whole() || compared.pixels > 200_000);
         // One in some ten thousand poses has one.
         assert!(compared.folds <= 3);
     }
@@ -84,7 +84,9 @@ fn cut_faces_are_where_lines_of_sight_meet_them() {
         changed,
         ..
     } = sweep(Mix::Anywhere, 400);
-    assert!(near > 400 && guard > 200 && cut_away > 200_000 && changed > 400);
+    assert!(
+        !seeded::is_whole() || near > 400 && guard > 200 && cut_away > 200_000 && changed > 400
+    );
 }
 
 #[test]

@@ -7,6 +7,7 @@ use texmap::{Mapper, Order};
 
 /// At every pixel the nearest face, written once, in `poses` poses by each of some mappers.
 fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
+    let poses = seeded::cases(poses);
     let mut random = seeded::generator();
     let mut storage = in_place::boxed!(Storage);
     for (name, solid, distances) in models(&mut random) {

@@ -12,7 +12,7 @@ use show::Show;
 use texmap::{Mapper, Order};
 
 /// Commands of a sequence, and how many of them the twin repeats after `hold`.
-const COMMANDS: u64 = 60;
+const COMMANDS: usize = 60;
 const REPEATED: u32 = 5;
 
 fn choice<T: Copy>(random: &mut Rng, all: &[T]) -> T {

@@ -34,7 +34,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
     let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let (mut tick, mut seen) = (random.u32(..1000), Vec::new());
-    for picture in 0..80 {
+    for picture in 0..seeded::cases(80) {
         show.present(tick, &mut |_| {});
         // A picture that is written over is another one; those after it are as they were.
         if picture / 10 % 2 == 0 {
@@ -76,7 +76,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
         }
         assert_eq!(done(show, "log", 0), log);
         // In any order.
-        for _ in 0..30 {
+        for _ in 0..seeded::cases(30) {
             let (tick, shown) = &seen[random.usize(..seen.len())];
             done(show, &format!("show at {tick}"), 0);
             assert_eq!(&evidence(show, 0), shown, "at {tick}");

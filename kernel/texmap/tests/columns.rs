@@ -77,7 +77,7 @@ fn every_walk_stays_inside_the_texture() {
     let mut random = seeded::generator();
     let texels = vec![0; 256 * 256];
     let (mut pixels, mut mapped) = (0, 0);
-    for case in 0..20_000 {
+    for case in 0..seeded::cases(20_000) {
         // The middle of the screen, its corners, and spreads from a pixel to beyond the screen.
         let centre = [(160, 120), (0, 0), (319, 239), (319, 0)][case % 4];
         let centre = (centre.0 * 256 + 128, centre.1 * 256 + 128);
@@ -96,8 +96,12 @@ fn every_walk_stays_inside_the_texture() {
         mapped += drawn(&polygon, &texture, by_map).len();
         pixels += exact;
     }
-    assert!(pixels > 100_000, "only {pixels} pixels were drawn at all");
-    assert!(mapped > 100_000, "only {mapped} pixels by a map");
+    let whole = seeded::is_whole();
+    assert!(
+        !whole || pixels > 100_000,
+        "only {pixels} pixels were drawn at all"
+    );
+    assert!(!whole || mapped > 100_000, "only {mapped} pixels by a map");
 }
 
 #[test]
@@ -122,7 +126,7 @@ fn a_triangle_has_its_one_affine_map() {
     let texels = [0; 64 * 16];
     let texture = Texture::new(&texels, 64, 16).unwrap();
     let mut compared = [0; 2];
-    for _ in 0..20_000 {
+    for _ in 0..seeded::cases(20_000) {
         let polygon: Vec<_> = (0..3)
             .map(|_| vertex(&mut random, (160 * 256, 120 * 256), 30 * 256, 1, (64, 16)))
             .collect();
@@ -153,7 +157,7 @@ fn a_triangle_has_its_one_affine_map() {
         }
     }
     assert!(
-        compared.iter().all(|&pixels| pixels > 1_000_000),
+        !seeded::is_whole() || compared.iter().all(|&pixels| pixels > 1_000_000),
         "only {compared:?} pixels were compared"
     );
 }
@@ -166,7 +170,7 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
     let texels = [0; 64 * 16];
     let texture = Texture::new(&texels, 64, 16).unwrap();
     let mut compared = 0;
-    for case in 0..5_000 {
+    for case in 0..seeded::cases(5_000) {
         let triangle: Vec<_> = (0..3)
             .map(|_| vertex(&mut random, (160 * 256, 120 * 256), 60 * 256, 1, (64, 16)))
             .collect();
@@ -202,7 +206,10 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
             compared += 1;
         }
     }
-    assert!(compared > 1_000_000, "only {compared} pixels were compared");
+    assert!(
+        !seeded::is_whole() || compared > 1_000_000,
+        "only {compared} pixels were compared"
+    );
 }
 
 /// The corners of the legal range: a half of the texture's width to the pixel, a corner as far out

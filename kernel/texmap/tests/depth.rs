@@ -166,7 +166,7 @@ fn level_triangle(random: &mut fastrand::Rng, wall: bool, upright: bool) -> Tria
 fn a_wall_and_a_floor_are_exact_but_for_drift() {
     let mut random = seeded::generator();
     let (mut pixels, mut walls, mut affine, mut exact, mut worst) = (0, 0, 0, 0, 0f64);
-    for case in 0..240 {
+    for case in 0..seeded::cases(240) {
         let (wall, upright) = (case % 2 == 0, case % 3 == 0);
         let mut triangle = level_triangle(&mut random, wall, upright);
         if case % 5 == 0 {
@@ -196,9 +196,11 @@ fn a_wall_and_a_floor_are_exact_but_for_drift() {
     }
     println!("{pixels} coordinates, {worst:.3} of the bound at worst");
     println!("{walls} walls, {affine} affine and {exact} exact runs");
-    assert!(pixels > 500_000 && worst > 0.8 && walls > 2_000 && affine > 5_000);
-    // Nothing that a wall needs is left to the exact mapper.
-    assert!(exact < affine / 100);
+    if seeded::is_whole() {
+        assert!(pixels > 500_000 && worst > 0.8 && walls > 2_000 && affine > 5_000);
+        // Nothing that a wall needs is left to the exact mapper.
+        assert!(exact < affine / 100);
+    }
 }
 
 #[test]
@@ -235,7 +237,7 @@ fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64
 fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewhere() {
     let mut random = seeded::generator();
     let (mut pixels, mut worst, mut ways) = (0, [0f64; 2], [0; 4]);
-    for case in 0..160 {
+    for case in 0..seeded::cases(160) {
         let mut triangle = Triangle::any(&mut random, [0.1, 1.0, 4.0][case % 3]);
         if case % 5 == 0 {
             triangle = triangle.through_windows(&mut random);
@@ -262,8 +264,10 @@ fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewher
         (pixels, *worst) = (pixels + more, worst.max(most));
     }
     println!("{pixels} coordinates, {worst:.3?} of the bound at worst; {ways:?}");
-    assert!(pixels > 1_000_000 && worst.iter().all(|&worst| worst > 0.8));
-    assert!(ways.iter().all(|&ways| ways > 10));
+    if seeded::is_whole() {
+        assert!(pixels > 1_000_000 && worst.iter().all(|&worst| worst > 0.8));
+        assert!(ways.iter().all(|&ways| ways > 10));
+    }
 }
 
 /// Along a line nothing changes but what the texture's axes bring: half a pixel is the only error,
@@ -291,7 +295,7 @@ fn linear(plane: &Plane, k: usize, (x, y): (f64, f64), (to_x, to_y): (f64, f64))
 fn tiles_are_off_by_what_their_edge_and_their_column_are_and_by_that_somewhere() {
     let mut random = seeded::generator();
     let (mut pixels, mut affine, mut exact, mut worst) = (0, 0, 0, 0f64);
-    for case in 0..160 {
+    for case in 0..seeded::cases(160) {
         // Without a change of depth only fixed point is left.
         let mut triangle = Triangle::any(&mut random, [0.0, 1.0, 3.0, 6.0][case % 4]);
         if case % 5 == 0 {
@@ -337,7 +341,9 @@ fn tiles_are_off_by_what_their_edge_and_their_column_are_and_by_that_somewhere()
     println!(
         "{pixels} coordinates, {worst:.3} of the bound at worst; {affine} pixels affine, {exact} exact"
     );
-    assert!(pixels > 1_000_000 && worst > 0.8 && exact > 1_000 && exact < affine);
+    assert!(
+        !seeded::is_whole() || pixels > 1_000_000 && worst > 0.8 && exact > 1_000 && exact < affine
+    );
 }
 
 #[test]
@@ -369,7 +375,7 @@ fn nearer_goes_the_way_in_which_depth_changes_less() {
 fn whatever_the_plane_is_coverage_stays_and_every_texel_is_inside() {
     let mut random = seeded::generator();
     let mut pixels = 0;
-    for case in 0..500 {
+    for case in 0..seeded::cases(500) {
         let size = [(1, 1), (256, 256), (256, 1), (3, 100)][case % 4];
         let texels = texels(size.0, size.1);
         let texture = Texture::padded(&texels, size.0, size.1).unwrap();
@@ -386,7 +392,7 @@ fn whatever_the_plane_is_coverage_stays_and_every_texel_is_inside() {
         }
     }
     println!("{pixels} pixels");
-    assert!(pixels > 1_000_000);
+    assert!(!seeded::is_whole() || pixels > 1_000_000);
 }
 
 /// The horizon through the middle of the picture, and the plane seen from behind.
@@ -435,7 +441,7 @@ fn plane_by_plane_they_draw_what_they_draw_polygon_by_polygon() {
     let mut random = seeded::generator();
     let texels = texels(SIZE.0, SIZE.1);
     let texture = Texture::padded(&texels, SIZE.0, SIZE.1).unwrap();
-    for case in 0..30 {
+    for case in 0..seeded::cases(30) {
         let triangle = match case % 3 {
             0 => level_triangle(&mut random, case % 2 == 0, case % 4 < 2),
             _ => Triangle::any(&mut random, 3.0),

@@ -178,7 +178,7 @@ fn every_loop_draws_its_clear_twin() {
     let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut page = Page::new();
-    for case in 0..4000 {
+    for case in 0..seeded::cases(4000) as u16 {
         // Every height, and then any.
         let len = if case < 240 {
             case + 1
@@ -241,7 +241,7 @@ fn masked_loops_wrap_any_walk_around_the_padding() {
     let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut page = Page::new();
-    for case in 0..4000 {
+    for case in 0..seeded::cases(4000) as u16 {
         let len = random.u16(1..=240);
         let size = (side(random), side(random));
         let texture = texture(&texels, size, true);
@@ -270,7 +270,7 @@ fn masked_loops_wrap_any_walk_around_the_padding() {
 fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
     let random = &mut seeded::generator();
     let texels = all_texels(random);
-    for case in 0..200 {
+    for case in 0..seeded::cases(200) {
         let texture = texture(&texels, (side(random), side(random)), random.bool());
         let len = random.u16(2..=240);
         let mut walk = legal_walk(random, &texture, len);

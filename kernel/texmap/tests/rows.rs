@@ -18,7 +18,7 @@ fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
     let texels = texels(100, 64);
     let texture = Texture::padded(&texels, 100, 64).unwrap();
     let (mut one, mut begins, mut ends) = (0, [0; 4], [0; 4]);
-    for case in 0..60 {
+    for case in 0..seeded::cases(60) {
         let polygon = polygon(&mut random, 3 + case % 6, (100, 64));
         let face = Face {
             polygon: &polygon,
@@ -50,7 +50,7 @@ fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
         }
     }
     println!("{one} rows of one pixel; begun in {begins:?}, ended in {ends:?}");
-    assert!(one > 20 && begins.iter().chain(&ends).all(|&rows| rows > 100));
+    assert!(!seeded::is_whole() || one > 20 && begins.iter().chain(&ends).all(|&rows| rows > 100));
 }
 
 /// A pixel, its coordinates, and its number in the run.
@@ -83,7 +83,7 @@ fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
     let texture = Texture::new(&texels, 256, 128).unwrap();
     for axis in [Axis::Right, Axis::Down] {
         let (mut compared, mut worst) = (0, 0f64);
-        for case in 0..400 {
+        for case in 0..seeded::cases(400) {
             // On the screen, over its border, and far beyond.
             let spread = [20, 150, 2_000][case % 3] * 256;
             let vertex = |random: &mut fastrand::Rng| Vertex {
@@ -126,7 +126,7 @@ fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
             }
         }
         println!("{axis:?}: {compared} pixels, {worst:.3} of the bound at worst");
-        assert!(compared > 1_000_000 && worst > 0.8);
+        assert!(!seeded::is_whole() || compared > 1_000_000 && worst > 0.8);
     }
 }
 

@@ -242,6 +242,7 @@ fn none_cheaper(
 /// Either way, no pixel of any face is further off than the tolerance, and no way that was taken is
 /// dearer than another.
 fn within(least: u32, tolerance: &str) {
+    let least = seeded::cases(least as usize) as u32;
     let mut random = seeded::generator();
     let tolerance = Tolerance::parse(tolerance).unwrap();
     let mut ways = [BTreeMap::new(), BTreeMap::new()];
@@ -302,6 +303,9 @@ fn within(least: u32, tolerance: &str) {
         }
         enough(runs.iter().all(|&runs| runs >= least))
     });
+    if !seeded::is_whole() {
+        return;
+    }
     println!(
         "within {tolerance}: worst {:.1} % of it",
         worst / f64::from(tolerance.units()) * 100.0
@@ -382,11 +386,14 @@ fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
                 let is_row = within.axis() == Axis::Right;
                 let all = [costs[usize::from(is_row)], costs[0].min(costs[1]), costs[0]];
                 sums = [0, 1, 2].map(|k| sums[k] + all[k]);
-                rows += u32::from(is_row);
+                rows += usize::from(is_row);
                 count += 1;
             }
-            enough(count >= 3000)
+            enough(count >= seeded::cases(3000))
         });
+        if !seeded::is_whole() {
+            continue;
+        }
         let [taken, best, columns] = sums;
         println!(
             "within {tolerance}: rows for {rows} of {count} faces, {:.3} of what the cheaper axis of each takes; \
@@ -428,6 +435,7 @@ fn a_million_affine_columns_keep_to_their_closed_form() {
 }
 
 fn affine(least: u32) {
+    let least = seeded::cases(least as usize) as u32;
     let mut random = seeded::generator();
     let (mut tightest, mut sum, mut count) = (0f64, 0f64, 0u32);
     let mut held: Option<(Vec<Vertex>, Affine, texmap::affine::Sides)> = None;
@@ -468,7 +476,10 @@ fn affine(least: u32) {
         tightest * 100.0,
         sum / f64::from(count) * 100.0
     );
-    assert!(tightest >= 0.8, "the bound is loose: {tightest}");
+    assert!(
+        !seeded::is_whole() || tightest >= 0.8,
+        "the bound is loose: {tightest}"
+    );
 }
 
 #[test]

@@ -11,7 +11,7 @@ use texmap::coverage::{self, Dropped};
 use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
 
 /// Cases of each mix: ten seconds of them.
-const CASES: u64 = 100_000;
+const CASES: usize = 100_000;
 
 fn polygon(points: &[(i32, i32)]) -> Vec<Point> {
     points.iter().map(|&(x, y)| Point { x, y }).collect()
@@ -32,7 +32,7 @@ fn columns_and_rows_cover_what_the_oracle_says_in_every_mix() {
     let mut checker = Checker::default();
     for mix in Mix::ALL {
         let mut pixels = 0;
-        for number in 0..CASES {
+        for number in 0..seeded::cases(CASES) as u64 {
             let from = format_args!("mix {mix:?}, seed {seed}, case {number}");
             pixels += check(&mut checker, &mix.case(seed, number), from);
         }
@@ -45,7 +45,7 @@ fn a_part_of_the_small_world_is_covered_as_the_oracle_says() {
     let mut random = seeded::generator();
     let mut checker = Checker::default();
     for step in STEPS {
-        for _ in 0..TRIANGLES / 50 {
+        for _ in 0..seeded::cases(TRIANGLES as usize / 50) {
             let number = random.u32(..TRIANGLES);
             let case = Case {
                 polygons: vec![triangle(step, number).to_vec()],

@@ -44,7 +44,7 @@ fn the_oracle_agrees_with_big_rationals() {
     let mut random = seeded::generator();
     let seed = random.get_seed();
     let (mut tied, mut far, mut yes) = (0, 0, 0);
-    for number in 0..CASES {
+    for number in 0..seeded::cases(CASES) {
         let mix = Mix::ALL[number % Mix::ALL.len()];
         let mut case = mix.case(seed, number as u64);
         let mut polygon = case.polygons.swap_remove(0);
@@ -78,7 +78,7 @@ fn the_oracle_agrees_with_big_rationals() {
         yes += usize::from(expected);
     }
     println!("{CASES} cases: {tied} ties, {far} at the limit, {yes} inside");
-    assert!(tied > CASES / 10 && far > CASES / 10 && yes > CASES / 10);
+    assert!(!seeded::is_whole() || tied > CASES / 10 && far > CASES / 10 && yes > CASES / 10);
 }
 
 #[test]
@@ -86,7 +86,7 @@ fn a_set_has_the_pixels_that_are_inside_one_by_one() {
     let seed = seeded::generator().get_seed();
     let mut pixels = Pixels::default();
     for mix in Mix::ALL {
-        for number in 0..40 {
+        for number in 0..seeded::cases(40) as u64 {
             for polygon in mix.case(seed, number).polygons {
                 let area = Area::around(&polygon);
                 pixels.cover(&polygon, &area);

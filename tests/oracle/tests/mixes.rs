@@ -61,7 +61,7 @@ fn every_mix_is_what_its_name_says_and_legal() {
     let seed = seeded::generator().get_seed();
     for mix in Mix::ALL {
         let mut sides = [false; MAX_SIDES];
-        for number in 0..5000 {
+        for number in 0..seeded::cases(5000) as u64 {
             let case = mix.case(seed, number);
             for polygon in &case.polygons {
                 sides[polygon.len()] = true;
@@ -78,6 +78,7 @@ fn every_mix_is_what_its_name_says_and_legal() {
             }
         }
         match mix {
+            _ if !seeded::is_whole() => {}
             Mix::Fans | Mix::Meshes => {}
             // A triangle is convex, and one with a vertex in a side has four.
             Mix::Crossing | Mix::Collinear => assert!(sides[4..=8].iter().all(|&seen| seen)),

@@ -38,7 +38,7 @@ fn by_weights(triangle: &[Vertex; 3], x: i32, y: i32) -> Option<[BigRational; 2]
 fn affine_coordinates_are_those_of_big_rationals() {
     let mut random = seeded::generator();
     let (mut compared, mut case) = (0, 0);
-    while compared < 100_000 {
+    while compared < seeded::cases(100_000) {
         case += 1;
         // A pixel's worth, the screen's, and the whole range; on a grid that brings ties.
         let reach = [512, 100 * 256, MAX_COORDINATE][case % 3];

@@ -8,11 +8,15 @@
 //! | `CRYSTAL_BALL_SEED` | every test takes this seed |
 //! | `CRYSTAL_BALL_CASES` | no test tries more cases than this, where its number of cases may vary ([`cases`]) |
 //!
+//! | `CRYSTAL_BALL_SEEDED` | a file to which each test that asks for a generator adds a line with its name |
+//!
 //! `cargo soak` repeats the random tests of the whole workspace.
 #![forbid(unsafe_code)]
 
-use std::env;
 use std::fmt::Write;
+use std::fs::OpenOptions;
+use std::io::Write as _;
+use std::{env, thread};
 
 use fastrand::Rng;
 
@@ -20,6 +24,9 @@ use fastrand::Rng;
 pub const SEED: &str = "CRYSTAL_BALL_SEED";
 /// The variable with the largest number of cases, a decimal number.
 pub const CASES: &str = "CRYSTAL_BALL_CASES";
+
+/// The variable with the file that learns which tests are random.
+pub const LOG: &str = "CRYSTAL_BALL_SEEDED";
 
 /// Returns the generator of a random test. Prints its seed, and the command that repeats the test with
 /// it: the test harness shows both if the test fails.
@@ -30,6 +37,17 @@ pub const CASES: &str = "CRYSTAL_BALL_CASES";
 /// If [`SEED`] is set, and not to a number.
 pub fn generator() -> Rng {
     let seed = number(SEED).unwrap_or_else(|| fastrand::u64(..));
+    if let (Some(log), Some(test)) = (env::var_os(LOG), thread::current().name()) {
+        let mut file = OpenOptions::new().create(true).append(true).open(&log);
+        let added = file
+            .as_mut()
+            .map(|file| file.write_all(format!("{test}\n").as_bytes()));
+        assert!(
+            matches!(added, Ok(Ok(()))),
+            "{LOG}: {} cannot be written",
+            log.display()
+        );
+    }
     println!("seed {seed}; to repeat this run:\n  {}", command(seed));
     Rng::with_seed(seed)
 }
@@ -38,11 +56,18 @@ pub fn generator() -> Rng {
 ///
 /// # Panics
 /// If [`CASES`] is set, and not to a number.
-pub fn cases(usual: u64) -> u64 {
+pub fn cases(usual: usize) -> usize {
     limit(usual, number(CASES))
 }
 
-fn limit(usual: u64, most: Option<u64>) -> u64 {
+/// Returns whether random tests try all of their cases. Only then is there enough for a test to assert
+/// that something rare was among them, or that a bound was nearly reached.
+pub fn is_whole() -> bool {
+    env::var_os(CASES).is_none()
+}
+
+fn limit(usual: usize, most: Option<u64>) -> usize {
+    let most = most.map(|most| usize::try_from(most).unwrap_or(usize::MAX));
     most.map_or(usual, |most| usual.min(most.max(1)))
 }
 
@@ -73,7 +98,7 @@ fn command(seed: u64) -> String {
         (Err(_), Err(_)) => {}
     }
     // The harness names a test's thread after the test; with one thread there is no such name.
-    match std::thread::current().name() {
+    match thread::current().name() {
         Some("main") | None => {}
         Some(test) => {
             let _ = write!(command, " {test}");
