@@ -99,8 +99,9 @@ impl fmt::Display for Verdict {
             }
             Self::Adapter { report } => write!(
                 f,
-                "the display adapter does not take Mode X{}\nQEMU 10.0 shows RAM in place of video \
-                 memory with `-machine smm=off`: leave that out, or use `-vga std`",
+                "the display adapter does not take Mode X{}\nQEMU 10.0 with `-machine smm=off` shows RAM \
+                 in place of video memory: leave that option out. In place of another adapter use \
+                 `--vga std`",
                 Indented(report)
             ),
             Self::TripleFault { booted: false } => f.write_str(
