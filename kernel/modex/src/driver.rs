@@ -285,6 +285,10 @@ impl<B: Bus> ModeX<B> {
     /// Takes the page after the one drawn last, once it can't be on the screen any more.
     fn turn(&mut self) {
         self.back = (self.back + 1) % PAGES;
+        // Only after pages that were drawn and not flipped to: the front page is not free.
+        if self.back == self.front {
+            self.back = (self.front + 1) % PAGES;
+        }
         if self.visible[self.back] {
             self.settle();
         }

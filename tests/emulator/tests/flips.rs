@@ -135,6 +135,20 @@ fn the_other_order_tears_when_an_interrupt_comes_before_the_write() {
     }
 }
 
+/// Pages that are drawn and never shown do not come round to the one that is.
+#[test]
+fn pages_that_are_not_flipped_to_leave_the_shown_one_alone() {
+    let mut card = ModeX::set(Vga::new(), &BLACK).unwrap();
+    for _ in 0..2 {
+        for _ in 0..7 {
+            card.begin(&[0; HEIGHT])
+                .column(0, 0, 1, |lane| lane.fill(|| 1));
+            assert_eq!(card.bus().take_faults(), []);
+        }
+        card.flip();
+    }
+}
+
 /// Frame after frame, drawn by the driver, with an interrupt of any length before one access in a few.
 #[test]
 fn pages_rotate_unseen_whatever_interrupts() {
