@@ -4,7 +4,7 @@
 //! figures are exact and must come twice the same, or there is an error. Under plain TCG the same
 //! clock is the host's, and times are good for ratios within one round alone; they come as medians
 //! with their spread. What the timed kernel drew is compared with what the emulated card holds, and
-//! there the accesses are counted, too: see [`accesses`].
+//! there the accesses are counted, too: see `accesses`.
 
 use std::collections::BTreeMap;
 use std::fmt;

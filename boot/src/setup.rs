@@ -6,7 +6,7 @@
 //!
 //! It is one locked step, done by every run and by every test that boots: cargo-nextest runs each test in a
 //! process of its own, and nothing here trusts that another process has finished. Whatever is kept in the
-//! [cache](cache) is made aside and renamed, so that it is whole or not there at every point where this
+//! cache is made aside and renamed, so that it is whole or not there at every point where this
 //! program can be killed; what is found there is verified before use and made again when it is damaged.
 
 use std::io::Write;

@@ -1,13 +1,13 @@
 //! A model's palette, light table and texels.
 //!
 //! Two reductions, each by a quantizer that works in a space of even steps to the eye (Oklab). The
-//! texture is reduced to [`MATERIALS`] colours. Then each of these is lit in all levels, from night
+//! texture is reduced to `MATERIALS` colours. Then each of these is lit in all levels, from night
 //! to glint, as the built-in ramps are; and what that gives is reduced to the part of the palette
 //! that background, writing and the split view's heat map leave free. The light table takes each
 //! material at each level to the nearest entry of the whole palette.
 //!
 //! Where the palette has no colour near enough, a surface would fall into bands. So a texel has not
-//! its material alone: by its place in a square of two by two it is one of [`VARIANTS`], and for
+//! its material alone: by its place in a square of two by two it is one of `VARIANTS`, and for
 //! each level the entries of the four are chosen one after the other, each to make good for what the
 //! ones before it were off. Together they have the colour that was meant.
 

@@ -9,8 +9,8 @@
 //!
 //! A face of the renderer is convex, flat, and has one texture plane. A polygon that is all of it
 //! stays whole, up to [`MAX_CORNERS`] corners; any other is cut into triangles by ears, which fit
-//! always. Flat is what bends by at most [`FLATNESS`], and one plane is what is off by at most
-//! [`TEXEL_FIT`] texels at a corner: less than can be seen. All pieces of a polygon have its normal,
+//! always. Flat is what bends by at most `FLATNESS`, and one plane is what is off by at most
+//! `TEXEL_FIT` texels at a corner: less than can be seen. All pieces of a polygon have its normal,
 //! so that no cut shows in the light.
 //!
 //! # Texture coordinates that are not there

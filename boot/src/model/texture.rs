@@ -115,7 +115,7 @@ impl Layout {
     /// What the polygons use of a picture of `size` pixels.
     ///
     /// # Errors
-    /// The first polygon that repeats the picture more often than [`MAX_REPEATS`] times.
+    /// The first polygon that repeats the picture more often than `MAX_REPEATS` times.
     pub fn new(polygons: &[Polygon], (width, height): (u32, u32)) -> Result<Self, BadLine> {
         let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         for polygon in polygons {

@@ -63,7 +63,7 @@ const NOT_MEASURED: &str = "not measured: its mappers were left out";
 /// Angles between the screen's axes and the line of constant depth, in tenths of a degree.
 const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
 
-/// The free direction's accuracy at each of [`TILTS`], if there is such a mapper.
+/// The free direction's accuracy at each of `TILTS`, if there is such a mapper.
 pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
     let free = Mapper::parse("free")?;
     let entry = Entry::parse("grazing-16")?;

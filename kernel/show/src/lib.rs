@@ -4,7 +4,7 @@
 //! when it does not: the motion keeps its pace. Held, it draws what `show` names and touches no
 //! video memory between commands, so that what is on the screen can be taken as evidence.
 //!
-//! A running show is steered, by keys and by commands, and notes that ([`mod@steering`]): held, it
+//! A running show is steered, by keys and by commands, and notes that (`steering`): held, it
 //! draws the picture of any tick of what was noted.
 //!
 //! It knows nothing of the machine: a card behind a [`modex::Bus`], bytes in, lines out, and the

@@ -145,7 +145,7 @@ fn port() -> Option<Uart16550<PioBackend>> {
 }
 
 /// A writer for reports of a panic or an exception: it goes past the lock, which the code that
-/// failed may hold, and waits for the host no longer than [`PATIENCE`] in all.
+/// failed may hold, and waits for the host no longer than `PATIENCE` in all.
 #[derive(Debug)]
 pub struct Unlocked {
     clock: timer::Countdown,

@@ -2,7 +2,7 @@
 //!
 //! [`Sides`] has the coordinates along a polygon's sides, and makes the walk down a run: exactly
 //! between the two crossings, or by chapter 57's half steps. For a triangle that is one affine map:
-//! where it is moderate, [`Map`] has it, and its walks at a fraction of the cost. [`column`] draws
+//! where it is moderate, [`Map`] has it, and its walks at a fraction of the cost. [`column()`] draws
 //! one.
 //!
 //! Legal input of the mapper: a walk as these make it (inside the texture). Error against the exact

@@ -47,7 +47,7 @@
 //!
 //! which is too large by 3 % where one depth is twice the other. That is at most T where the mean
 //! depth sqrt(c d) is at least R n^(2/3), with R^3 = |D c'| / (4 T): R is one number for a run, or
-//! for many, and tells of every place how long a chord may be there ([`Chords`]).
+//! for many, and tells of every place how long a chord may be there (`Chords`).
 //!
 //! # What is rounded, and what is clamped
 //!

@@ -17,7 +17,7 @@
 //! [`crate::bounds`] says it is never off by. If the estimate less the margin and the estimate and
 //! the margin have the same floor, so has the quotient between them: that *is* the texel. Only
 //! where they have not, which is within the margin of a texel's border, the pixel is divided. At
-//! [`MARGIN`] that is one in 8 at most, where the texture is passed evenly.
+//! `MARGIN` that is one in 8 at most, where the texture is passed evenly.
 //!
 //! [`Plane::new`]: crate::Plane::new
 

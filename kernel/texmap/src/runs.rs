@@ -28,7 +28,7 @@
 //!
 //! Over n steps of a pixel the value grows by S, and S by T, with T = 2 K / n^2 and S = (d - K) / n +
 //! K / n^2: not by the two coefficients, which are those of a step without an end. They have 48
-//! fraction bits, and each is off by less than 2^13 / n last places ([`share`]), or by none where n is
+//! fraction bits, and each is off by less than 2^13 / n last places (`share`), or by none where n is
 //! a power of two: over 319 pixels the value drifts by less than 2^-26 texel. It starts half of
 //! 2^-16 higher, so cutting the rest off rounds to nearest, and a drift below zero or beyond the last
 //! coordinate is cut off with it.
@@ -546,7 +546,7 @@ pub fn quadratic(
 }
 
 /// The coordinates of a plane's walk, linear or quadratic in each piece, pixel after pixel: the
-/// clear twin of [`linear`] and [`quadratic`], each polynomial multiplied out for every pixel.
+/// clear twin of `linear` and [`quadratic`], each polynomial multiplied out for every pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Steps {
     cuts: Cuts,

@@ -5,8 +5,8 @@
 //! hardware would not show as meant is a [`Fault`] here, and so is every register, value, port or
 //! address that no scene uses: a feature comes with the scene that needs it.
 //!
-//! - [`sequencer`], [`graphics`], [`crtc`], [`attribute`], [`dac`], [`memory`]: a file per block
-//!   of the chip, each with its registers and what it makes of them; [`monitor`]: what the CRTC's
+//! - `sequencer`, `graphics`, `crtc`, `attribute`, `dac`, `memory`: a file per block
+//!   of the chip, each with its registers and what it makes of them; `monitor`: what the CRTC's
 //!   registers give a monitor, and what it needs;
 //! - [`Vga`]: the card. It decodes ports and the window, and implements [`modex::Bus`], so the
 //!   driver and the renderer run on it as they do on the bare machine;
