@@ -21,6 +21,7 @@ use std::sync::{Once, OnceLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
+use console::strip_ansi_codes;
 use rustix::process::{Pid, Signal, kill_process_group};
 
 /// How much of a failed child's error output its error message repeats.
@@ -178,10 +179,13 @@ fn read_lines(
             .read_until(b'\n', &mut bytes)
             .is_ok_and(|read| read > 0)
         {
-            if send
-                .send((stream, String::from_utf8_lossy(&bytes).into_owned()))
-                .is_err()
-            {
+            let text = String::from_utf8_lossy(&bytes);
+            let text = match stream {
+                Stream::Out => text,
+                // Words for people: a program that was told to colour them does so into pipes, too.
+                Stream::Err => strip_ansi_codes(&text).into_owned().into(),
+            };
+            if send.send((stream, text.into_owned())).is_err() {
                 return;
             }
             bytes.clear();

@@ -20,6 +20,7 @@ use modex::Rgb6;
 use crate::child;
 use crate::dump::Dump;
 use crate::indexed::Indexed;
+use crate::quote;
 use crate::report::Report;
 use crate::setup::say;
 
@@ -52,7 +53,7 @@ impl Subject {
     /// # Errors
     /// A file that can't be read, or is neither: with its name, and the line where a dump is wrong.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
-        Self::load(path).with_context(|| path.display().to_string())
+        Self::load(path).with_context(|| quote::path(path))
     }
 
     fn load(path: &Path) -> anyhow::Result<Self> {
@@ -599,12 +600,12 @@ pub fn run(
             let why = match other.metadata() {
                 Ok(_) => format!(
                     "{} is a folder and {} is none; give two files or two folders",
-                    folder.display(),
-                    other.display()
+                    quote::path(folder),
+                    quote::path(other)
                 ),
-                Err(error) => format!("{}: it cannot be read: {error}", other.display()),
+                Err(error) => format!("{}: it cannot be read: {error}", quote::path(other)),
             };
-            findings.incomparable(&other.display().to_string(), &why);
+            findings.incomparable(&quote::path(other), &why);
         }
     }
     let outcome = findings.outcome();
@@ -628,11 +629,17 @@ struct Findings<'a, W> {
 
 impl<W: Write> Findings<'_, W> {
     fn files(&mut self, a: &Path, b: &Path) -> anyhow::Result<()> {
-        let (from, to) = (a.display(), b.display());
+        let (from, to) = (quote::path(a), quote::path(b));
         let name = match (a.file_name(), b.file_name()) {
-            (Some(a), Some(b)) if a != b => format!("{} and {}", a.display(), b.display()),
-            (_, Some(b)) => b.display().to_string(),
-            (_, None) => to.to_string(),
+            (Some(a), Some(b)) if a != b => {
+                format!(
+                    "{} and {}",
+                    quote::path(a.as_ref()),
+                    quote::path(b.as_ref())
+                )
+            }
+            (_, Some(b)) => quote::path(b.as_ref()),
+            (_, None) => to.clone(),
         };
         let differs = format!("{to} differs from {from}");
         self.pair(&name, &differs, &format!("{from} and {to}"), a, b)?;
@@ -648,7 +655,7 @@ impl<W: Write> Findings<'_, W> {
             match list(folder) {
                 Ok(list) => *names = list,
                 Err(error) => {
-                    let folder = folder.display().to_string();
+                    let folder = quote::path(folder);
                     let why = format!("{folder}: it cannot be read: {error}");
                     self.incomparable(&folder, &why);
                     return Ok(());
@@ -660,14 +667,14 @@ impl<W: Write> Findings<'_, W> {
             if child::interrupted() {
                 return Err(child::Interrupted.into());
             }
-            let shown = name.display().to_string();
+            let shown = quote::path(name.as_ref());
             let lacks = match (in_a.contains(&name), in_b.contains(&name)) {
                 (true, false) => Some((a, b)),
                 (false, _) => Some((b, a)),
                 (true, true) => None,
             };
             if let Some((has, lacks)) = lacks {
-                let (has, lacks) = (has.display(), lacks.display());
+                let (has, lacks) = (quote::path(has), quote::path(lacks));
                 self.pairs += 1;
                 self.incomparable(&shown, &format!("{shown} is in {has}, {lacks} lacks it"));
                 continue;
@@ -677,7 +684,7 @@ impl<W: Write> Findings<'_, W> {
         }
         let pairs = self.pairs;
         if pairs == 0 {
-            let (a, b) = (a.display().to_string(), b.display());
+            let (a, b) = (quote::path(a), quote::path(b));
             let why = format!("there is nothing to compare: no .dump and no .png in {a} and {b}");
             self.incomparable(&a, &why);
             return Ok(());

@@ -12,6 +12,7 @@ use link::{Content, Lines, Motion, Picture, Word};
 use modex::Palette;
 
 use crate::indexed::Indexed;
+use crate::quote::quoted;
 
 /// What a card held: its palette and the pixels of a page, or of all video memory.
 #[derive(Clone, PartialEq, Eq)]
@@ -209,13 +210,7 @@ impl<'a> Reader<'a> {
         let rest = line
             .strip_prefix(label)
             .and_then(|rest| rest.strip_prefix(' '));
-        let rest = rest.ok_or_else(|| {
-            let mut said: String = line.chars().take(label.len().max(12)).collect();
-            if said.len() < line.len() {
-                said += "...";
-            }
-            format!("'{said}' stands where '{label}' should")
-        })?;
+        let rest = rest.ok_or_else(|| format!("{} stands where '{label}' should", quoted(line)))?;
         self.whole.add(format_args!("{line}"));
         Ok(rest)
     }
@@ -226,8 +221,10 @@ impl<'a> Reader<'a> {
             Ok(version @ OLDEST..=VERSION) => version,
             _ => {
                 return Err(format!(
-                    "it is a dump of version {version}; this program reads versions {OLDEST} to \
-                     {VERSION}"
+                    "it is a dump of version {}; this program reads versions {OLDEST} to {VERSION}",
+                    version
+                        .parse::<u32>()
+                        .map_or(quoted(version), |known| known.to_string())
                 ));
             }
         };
@@ -247,7 +244,8 @@ impl<'a> Reader<'a> {
         let said = self.line("end")?;
         if format!("end {said}") != end {
             return Err(format!(
-                "it says 'end {said}', but the lines before it make '{end}'"
+                "it ends in {}, but the lines before it make '{end}'",
+                quoted(said)
             ));
         }
         if self.read < self.lines.len() {
@@ -265,9 +263,13 @@ impl<'a> Reader<'a> {
         let content = match self.line("content")? {
             "page" => Content::Page,
             "memory" => Content::Memory,
-            other => return Err(format!("content is 'page' or 'memory', not '{other}'")),
+            other => {
+                let other = quoted(other);
+                return Err(format!("content is 'page' or 'memory', not {other}"));
+            }
         };
-        let scene = self.line("scene")?.to_string();
+        let scene = self.line("scene")?;
+        let scene = Word::new(scene).ok_or_else(|| format!("{} is no scene", quoted(scene)))?;
         let pack = match self.line("pack")? {
             "none" => None,
             digits => {
@@ -281,26 +283,26 @@ impl<'a> Reader<'a> {
         };
         let mapper = match self.line("mapper")? {
             "none" => None,
-            name => Some(Word::new(name).ok_or_else(|| format!("'{name}' is no mapper's name"))?),
+            name => Some(Word::new(name).ok_or_else(|| format!("{} is no mapper", quoted(name)))?),
         };
         let picture = match self.line("picture")? {
             "none" => None,
             name => Some(
-                Picture::parse(name.split(' ')).ok_or_else(|| format!("'{name}' is no picture"))?,
+                Picture::parse(name.split(' '))
+                    .ok_or_else(|| format!("{} is no picture", quoted(name)))?,
             ),
         };
         // Version 3 named a mapper without a picture, and did not know the motion.
         let mapper = mapper.filter(|_| picture.is_some());
-        let motion =
-            match version {
-                ..4 => None,
-                _ => match self.line("motion")? {
-                    "none" => None,
-                    parts => Some(Motion::parse(parts.split(' ')).ok_or_else(|| {
-                        format!("'{parts}' is no motion: it has four hex numbers")
-                    })?),
-                },
-            };
+        let motion = match version {
+            ..4 => None,
+            _ => match self.line("motion")? {
+                "none" => None,
+                parts => Some(Motion::parse(parts.split(' ')).ok_or_else(|| {
+                    format!("{} is no motion: it has four hex numbers", quoted(parts))
+                })?),
+            },
+        };
         let mut start = Vec::new();
         hex(self.line("start")?, &mut start)?;
         let start: [u8; 2] = start
@@ -318,11 +320,12 @@ impl<'a> Reader<'a> {
                 && width / 4 * height <= PLANE_BYTES
         };
         let (width, height) = sides.filter(legal).ok_or_else(|| {
-            format!("'{size}' is no size: a width in fours up to {MAX_WIDTH}, and a height")
+            let size = quoted(size);
+            format!("{size} is no size: a width in fours up to {MAX_WIDTH}, and a height")
         })?;
         Ok(Header {
             content,
-            scene,
+            scene: scene.to_string(),
             pack,
             mapper,
             picture,
@@ -341,7 +344,8 @@ impl<'a> Reader<'a> {
                 let before = parts.len();
                 hex(colour, &mut parts)?;
                 if parts.len() - before != 3 || parts[before..].iter().any(|&part| part > 0x3F) {
-                    return Err(format!("'{colour}' is no colour: three parts of 00 to 3f"));
+                    let colour = quoted(colour);
+                    return Err(format!("{colour} is no colour: three parts of 00 to 3f"));
                 }
             }
             let there = parts.len() / 3 - first;
@@ -370,10 +374,9 @@ fn hex(digits: &str, bytes: &mut Vec<u8>) -> Result<(), String> {
                 .map(|(high, low)| high << 4 | low),
             _ => None,
         };
-        bytes.push(byte.ok_or_else(|| {
-            let pair = String::from_utf8_lossy(pair);
-            format!("'{pair}' is no pair of digits 0 to 9 and a to f")
-        })?);
+        bytes.push(
+            byte.ok_or_else(|| format!("{} is no pair of digits 0 to 9 and a to f", quoted(pair)))?,
+        );
     }
     Ok(())
 }

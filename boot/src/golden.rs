@@ -45,6 +45,7 @@ use crate::diff::{Difference, Subject, compare};
 use crate::indexed::Indexed;
 use crate::look::{Look, Named};
 use crate::machine::Machine;
+use crate::quote::{printable, quoted};
 use crate::report::Report;
 use crate::screen::Screen;
 use crate::setup::Step;
@@ -117,9 +118,12 @@ impl Golden {
     fn read(path: &Path) -> anyhow::Result<Self> {
         let wrong = || format!("{} is no golden's description", path.display());
         let text = std::fs::read_to_string(path).with_context(wrong)?;
-        let description: Description = toml::from_str(&text).with_context(wrong)?;
+        let description: Description = toml::from_str(&text)
+            .map_err(|error| syntax(&text, &error))
+            .with_context(wrong)?;
         let pictures = description.show.iter().map(|name| {
-            Picture::parse(name.split(' ')).with_context(|| format!("'{name}' is no picture"))
+            Picture::parse(name.split(' '))
+                .with_context(|| format!("{} is no picture", quoted(name)))
         });
         let show = pictures
             .collect::<Result<Vec<_>, _>>()
@@ -165,6 +169,13 @@ impl Golden {
     }
 }
 
+/// An error of TOML's with its line. The error's own words repeat the file's bytes as they are.
+fn syntax(text: &str, error: &toml::de::Error) -> anyhow::Error {
+    let before = error.span().and_then(|span| text.get(..span.start));
+    let line = 1 + before.map_or(0, |text| text.matches('\n').count());
+    anyhow::anyhow!("line {line}: {}", printable(error.message()))
+}
+
 /// What a description names, if it names it.
 fn known<T>(
     what: &str,
@@ -172,7 +183,7 @@ fn known<T>(
     parse: impl FnOnce(&str) -> Option<T>,
 ) -> anyhow::Result<Option<T>> {
     let Some(name) = name else { return Ok(None) };
-    let named = parse(&name).with_context(|| format!("there is no {what} '{name}'"))?;
+    let named = parse(&name).with_context(|| format!("there is no {what} {}", quoted(&name)))?;
     Ok(Some(named))
 }
 

@@ -12,6 +12,7 @@ pub mod look;
 pub mod machine;
 pub mod measure;
 pub mod model;
+pub mod quote;
 pub mod record;
 pub mod replay;
 pub mod report;

@@ -43,6 +43,7 @@ pub use verdict::{Failure, Found, Verdict};
 use crate::card::Card;
 use crate::child;
 use crate::dump::Dump;
+use crate::quote::quoted;
 use crate::screen::Screen;
 use crate::setup::Ready;
 
@@ -744,7 +745,7 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event
                     continue;
                 };
                 let text = line.map_err(|noise| noise.to_string()).and_then(|line| {
-                    link::unframe(line).map_err(|error| format!("{error}: '{line}'"))
+                    link::unframe(line).map_err(|error| format!("{error}: {}", quoted(line)))
                 });
                 greeted |= text.is_ok();
                 let event = match text {

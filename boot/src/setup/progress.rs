@@ -10,14 +10,18 @@ use std::time::{Duration, Instant};
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 
 use crate::child::Event;
+use crate::quote;
 
 /// Without a terminal: this long without a word is long enough.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// One line for the user, on standard error; lost where that is closed.
+/// Writes a message to standard error, on lines of its own; lost where that is closed.
+///
+/// Whatever the message quotes, no escape sequence in it reaches the terminal.
 pub fn say(text: impl Display) {
+    let text = text.to_string();
     // There is no other place to report that standard error is closed.
-    let _ = writeln!(stderr().lock(), "{text}");
+    let _ = writeln!(stderr().lock(), "{}", quote::printable(&text));
 }
 
 /// Bytes as people read them.

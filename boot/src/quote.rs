@@ -1,0 +1,121 @@
+//! Foreign bytes in messages.
+//!
+//! A file, a dump, QEMU or the serial line may hold any bytes, and a terminal obeys some of them:
+//! escape sequences recolour, retitle or rewrite the screen. Messages therefore show every byte that
+//! does not print as an escape (`\x1b`, `\u{202e}`).
+
+use std::borrow::Cow;
+use std::path::Path;
+
+/// Longest quotation, in characters.
+const MOST: usize = 40;
+
+/// Returns foreign bytes in single quotes: escaped, and cut after [`MOST`] characters.
+///
+/// A cut quotation ends in `...` and the number of bytes that the whole has.
+pub fn quoted(bytes: impl AsRef<[u8]>) -> String {
+    let bytes = bytes.as_ref();
+    let (mut said, mut length) = (String::from("'"), 0);
+    for chunk in bytes.utf8_chunks() {
+        let whole = chunk.valid().chars().map(|c| match c {
+            '\\' => "\\\\".into(),
+            c => escaped(c),
+        });
+        let broken = chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}"));
+        for piece in whole.chain(broken) {
+            length += piece.chars().count();
+            if length > MOST {
+                return format!("{said}...' ({} bytes)", bytes.len());
+            }
+            said += &piece;
+        }
+    }
+    said + "'"
+}
+
+/// Returns a path, escaped and whole: the reader looks for the file.
+pub fn path(path: &Path) -> String {
+    let bytes = path.as_os_str().as_encoded_bytes();
+    bytes
+        .utf8_chunks()
+        .flat_map(|chunk| {
+            let broken = chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}"));
+            chunk.valid().chars().map(escaped).chain(broken)
+        })
+        .collect()
+}
+
+/// Returns text as a terminal may get it: its lines and tabs stay, all else that does not print is
+/// escaped.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let plain = |c: char| matches!(c, ' '..='~' | '\n' | '\t');
+    if text.chars().all(plain) {
+        return text.into();
+    }
+    let keep = |c: char| match c {
+        '\n' | '\t' => c.into(),
+        c => escaped(c),
+    };
+    text.chars().map(keep).collect()
+}
+
+/// Returns a character as it is if it prints, else its escape.
+fn escaped(c: char) -> String {
+    match c {
+        ' '..='~' => c.into(),
+        _ if c.is_ascii() => format!("\\x{:02x}", c as u32),
+        // `str` escapes what does not print. A combining mark prints behind a letter.
+        _ => format!("a{c}").escape_debug().skip(1).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::ffi::OsStr;
+    use std::os::unix::ffi::OsStrExt;
+
+    use super::*;
+
+    #[test]
+    fn nothing_that_a_terminal_obeys_comes_through() {
+        for (bytes, said) in [
+            (&b"plain"[..], "'plain'"),
+            (b"", "''"),
+            (b"\x1b[31mEVIL\x1b[0m", r"'\x1b[31mEVIL\x1b[0m'"),
+            (b"a\r\n\t\0\x7f", r"'a\x0d\x0a\x09\x00\x7f'"),
+            (br"\x1b", r"'\\x1b'"),
+            (b"\xe4\xff", r"'\xe4\xff'"),
+            ("ä, \u{9b}31m".as_bytes(), r"'ä, \u{9b}31m'"),
+            (
+                "\u{202e}\u{2028}\u{200b}e\u{301}".as_bytes(),
+                "'\\u{202e}\\u{2028}\\u{200b}e\u{301}'",
+            ),
+        ] {
+            assert_eq!(quoted(bytes), said);
+        }
+        let all: Vec<u8> = (0..=255).collect();
+        for one in all.iter().map(|byte| quoted([*byte])) {
+            assert!(
+                one.bytes().all(|byte| (b' '..=b'~').contains(&byte)),
+                "{one}"
+            );
+        }
+        let name = Path::new(OsStr::from_bytes(b"a\x1b[2J\nb\xff\\.obj"));
+        assert_eq!(path(name), r"a\x1b[2J\x0ab\xff\.obj");
+        assert_eq!(printable("ä\tb\nc"), "ä\tb\nc");
+        assert_eq!(printable("a\x1b]0;b\x07\r\n"), "a\\x1b]0;b\\x07\\x0d\n");
+    }
+
+    #[test]
+    fn a_quotation_is_cut_and_never_within_an_escape() {
+        let long = [b'x'; 20_000];
+        assert_eq!(quoted(&long[..MOST]), format!("'{}'", "x".repeat(MOST)));
+        let cut = format!("'{}...' (20000 bytes)", "x".repeat(MOST));
+        assert_eq!(quoted(long), cut);
+        let escapes = quoted([0x1b; 100]);
+        assert_eq!(escapes, format!("'{}...' (100 bytes)", r"\x1b".repeat(10)));
+        // A name of the file system's longest kind stays whole.
+        let name = "y".repeat(4096);
+        assert_eq!(path(Path::new(&name)), name);
+    }
+}
