@@ -100,7 +100,7 @@ fn qemu_shows_and_holds_every_golden() {
 
 /// What kind of scene a golden shows.
 fn kind_of_scene(golden: &Golden) -> &'static str {
-    match golden.look.scene.map_or("ball", |scene| scene.0.name) {
+    match golden.look.scene.map_or("ball", |scene| scene.0) {
         "ball" | "cube" => "convex solid",
         "knot" => "solid that hides parts of itself",
         "facing" | "tilted" | "wall" => "single face",

@@ -20,7 +20,8 @@ const AFFINE_BITS: u32 = 7;
 
 /// A golden's scene.
 fn scene(golden: &Golden) -> &'static Entry<'static> {
-    golden.look.scene.map_or(&CATALOGUE[0], |scene| scene.0)
+    let scene = golden.look.scene.and_then(|scene| Entry::parse(scene.0));
+    scene.unwrap_or(&CATALOGUE[0])
 }
 
 /// The pose of a golden's last picture.

@@ -134,7 +134,7 @@ impl Golden {
         let look = Look {
             scene: known("scene", description.scene, Entry::parse)
                 .with_context(wrong)?
-                .map(Named),
+                .map(|entry| Named(entry.name)),
             mapper: known("mapper", description.mapper, Mapper::parse).with_context(wrong)?,
             order: known("order", description.order, Order::parse)
                 .with_context(wrong)?

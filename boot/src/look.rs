@@ -13,9 +13,9 @@ use texmap::{Mapper, Order};
 /// Scene, mapper and order; what is not chosen is as the program has it.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Look {
-    /// What is shown
+    /// What is shown [default: ball, or your own model]
     #[arg(long, global = true, value_name = "NAME")]
-    pub scene: Option<Named<&'static Entry<'static>>>,
+    pub scene: Option<Named<&'static str>>,
     /// How textures are mapped
     #[arg(long, global = true, value_name = "NAME", value_parser = Mappers)]
     pub mapper: Option<Mapper>,
@@ -28,7 +28,7 @@ impl Look {
     /// The commands that set it, after [`Command::Hold`].
     pub fn commands(&self) -> impl Iterator<Item = Command> {
         let set = |setting, name: &dyn Display| Some(Command::Set(setting, Some(Word::of(name)?)));
-        let scene = self.scene.and_then(|s| set(Setting::Scene, &s.0.name));
+        let scene = self.scene.and_then(|s| set(Setting::Scene, &s.0));
         let mapper = self.mapper.and_then(|m| set(Setting::Mapper, &m));
         let order = self.order.and_then(|o| set(Setting::Order, &o.0));
         scene.into_iter().chain(mapper).chain(order)
@@ -69,17 +69,20 @@ impl TypedValueParser for Mappers {
     }
 }
 
-/// All scenes.
-static SCENES: LazyLock<Vec<Named<&'static Entry<'static>>>> =
-    LazyLock::new(|| CATALOGUE.iter().map(Named).collect());
+/// The names of all scenes, the user's own model last.
+static SCENES: LazyLock<Vec<Named<&'static str>>> = LazyLock::new(|| {
+    let built_in = CATALOGUE.iter().map(|entry| entry.name);
+    built_in.chain([Entry::LOADED]).map(Named).collect()
+});
 
-impl ValueEnum for Named<&'static Entry<'static>> {
+impl ValueEnum for Named<&'static str> {
     fn value_variants<'a>() -> &'a [Self] {
         &SCENES
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        Some(PossibleValue::new(self.0.name).help(self.0.about))
+        let about = Entry::parse(self.0).map_or("your own --model", |entry| entry.about);
+        Some(PossibleValue::new(self.0).help(about))
     }
 }
 

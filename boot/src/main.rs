@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -13,12 +13,14 @@ use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::diff;
 use crystal_ball::frames::Frames;
 use crystal_ball::golden;
-use crystal_ball::look::Look;
+use crystal_ball::look::{Look, Named};
 use crystal_ball::machine::{Config, Failure, Machine, Printed, Verdict};
 use crystal_ball::model::{Files, Model};
+use crystal_ball::quote::printable;
 use crystal_ball::setup::{self, Options, Ready, say};
-use crystal_ball::{aside, child, record, replay, trade, window};
+use crystal_ball::{aside, child, quote, record, replay, trade, window};
 use link::{Action, Change, Command};
+use scene::catalogue::Entry;
 
 /// How long the ball turns before its picture is taken without a display.
 const WARM_UP: Duration = Duration::from_secs(1);
@@ -205,12 +207,16 @@ enum Subcommands {
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    // clap does not know it of options that stand on different sides of a subcommand.
-    if cli.model.texture.is_some() && cli.model.model.is_none() {
+    // clap cannot require it of options that stand on different sides of a subcommand.
+    let needs_model = match (&cli.model.texture, cli.look.scene) {
+        (Some(_), _) => Some("--texture"),
+        (_, Some(Named(Entry::LOADED))) => Some("--scene model"),
+        _ => None,
+    };
+    if let Some(option) = needs_model.filter(|_| cli.model.model.is_none()) {
         let kind = clap::error::ErrorKind::MissingRequiredArgument;
-        Cli::command()
-            .error(kind, "--texture is for a --model")
-            .exit();
+        let message = format!("{option} needs your own model: add --model FILE.obj");
+        Cli::command().error(kind, message).exit();
     }
     child::catch_interrupts();
     match run(cli) {
@@ -257,8 +263,17 @@ impl Output {
 }
 
 impl Write for Output {
+    /// A program in a pipe gets each byte; a terminal gets no escape sequence, such as a file's name
+    /// may have.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        Self::attempt(bytes.len(), io::stdout().write(bytes))
+        let mut out = io::stdout().lock();
+        match std::str::from_utf8(bytes) {
+            Ok(text) if out.is_terminal() => {
+                let written = out.write_all(printable(text).as_bytes());
+                Self::attempt(bytes.len(), written.map(|()| bytes.len()))
+            }
+            _ => Self::attempt(bytes.len(), out.write(bytes)),
+        }
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -347,7 +362,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             let Look { scene, mapper, .. } = cli.look;
             trade_options
                 .scenes
-                .extend(scene.map(|scene| scene.0.name.into()));
+                .extend(scene.map(|scene| scene.0.into()));
             trade_options
                 .mappers
                 .extend(mapper.map(|mapper| mapper.to_string()));
@@ -381,7 +396,7 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
 fn load(files: &Files) -> anyhow::Result<Option<Model>> {
     let model = files.load()?;
     if let (Some(model), Some(path)) = (&model, &files.model) {
-        say(format_args!("{}: {model}", path.display()));
+        say(format_args!("{}: {model}", quote::path(path)));
     }
     Ok(model)
 }
