@@ -65,8 +65,15 @@ impl Indexed {
             bail!("its pixels are {colour:?} of {depth:?} bits, not indices of eight");
         };
         let parts = info.palette.as_deref().context("it has no palette")?;
+        let (colours, rest) = parts.as_chunks::<3>();
+        if !rest.is_empty() || colours.len() > 256 {
+            bail!(
+                "its palette has {} bytes, not three for each of up to 256 colours",
+                parts.len()
+            );
+        }
         let mut palette = Vec::new();
-        for (entry, colour) in parts.as_chunks::<3>().0.iter().enumerate() {
+        for (entry, colour) in colours.iter().enumerate() {
             if let Some(part) = colour.iter().find(|&&part| widen(part >> 2) != part) {
                 bail!("palette entry {entry:02x} has a part {part:02x}, which no 6 bits make");
             }

@@ -10,6 +10,8 @@
 //! ([`pack`] has the format). The same files make the same pack.
 
 pub mod colour;
+mod guard;
+mod kind;
 pub mod mesh;
 pub mod obj;
 pub mod texture;
@@ -18,20 +20,25 @@ use std::fmt;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
-use anyhow::Context;
+use anyhow::{Context, anyhow, bail};
 use pack::{Pack, Parts};
 use scene::Mesh;
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use texmap::Texture;
 
 use colour::Reduced;
-use mesh::{Polygons, Solid, Tally};
-use obj::Obj;
-use texture::Layout;
+use mesh::{Polygons, Solid, Tally, Turned};
+use obj::{BadLine, Obj};
+use texture::{Layout, Picture};
 
-/// Most bytes of an OBJ: far more than a model of [`pack::MAX_FACES`] faces has.
+use crate::quote;
+
+/// Most bytes of an OBJ: far more than a model of [`scene::MAX_FACES`] faces has.
 const MAX_BYTES: u64 = 64 << 20;
+/// Longest time that making a model may take: far more than the largest one takes.
+const MOST_TIME: Duration = Duration::from_secs(120);
 /// Bytes of a ramdisk that the boot loader reads in a second from the disk that this program gives
 /// QEMU: 16 MiB took 8.6 s longer than none. From an IDE disk it is a sixth of that.
 const BYTES_A_SECOND: f64 = 2e6;
@@ -44,7 +51,7 @@ pub struct Files {
     /// Your own model: a Wavefront OBJ
     #[arg(long, global = true, value_name = "FILE.obj")]
     pub model: Option<PathBuf>,
-    /// Its texture [default: a marble board]
+    /// Its texture, a PNG; transparent parts are drawn over grey (808080) [default: a marble board]
     #[arg(long, global = true, value_name = "FILE.png")]
     pub texture: Option<PathBuf>,
 }
@@ -88,43 +95,66 @@ impl Model {
     /// Makes a model of an OBJ, and of a PNG for a texture; without one it gets a pattern.
     ///
     /// # Errors
-    /// As [`Files::load`].
+    /// As [`Files::load`]. [`Interrupted`](crate::child::Interrupted) as soon as the user asks to
+    /// stop.
     pub fn load(obj: &Path, png: Option<&Path>) -> anyhow::Result<Self> {
-        let name = || obj.display().to_string();
-        let mut bytes = Vec::new();
-        File::open(obj)
-            .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
-            .context("it cannot be read")
-            .with_context(name)?;
-        if bytes.len() as u64 > MAX_BYTES {
-            return Err(anyhow::anyhow!("it has more than {MAX_BYTES} bytes")).with_context(name);
-        }
+        let (obj, png) = (obj.to_owned(), png.map(Path::to_owned));
+        let name = quote::path(&obj);
+        let work = move || Self::load_files(&obj, png.as_deref());
+        guard::run(&name, MOST_TIME, work)
+    }
+
+    fn load_files(obj: &Path, png: Option<&Path>) -> anyhow::Result<Self> {
+        let bytes = read_obj(obj).with_context(|| quote::path(obj))?;
         let picture = match png {
             Some(png) => {
                 let file = File::open(png).context("it cannot be read");
                 let picture = file.and_then(|file| texture::read(BufReader::new(file)));
-                Some(picture.with_context(|| png.display().to_string())?)
+                Some(picture.with_context(|| quote::path(png))?)
             }
             None => None,
         };
-        Self::new(&bytes, picture.as_ref()).with_context(name)
+        Self::new(&bytes, picture.as_ref()).map_err(|error| {
+            let name = quote::path(obj);
+            match error.downcast::<BadLine>() {
+                Ok(BadLine { line, why }) => anyhow!("{name}:{line}: {why}"),
+                Err(error) => error.context(name),
+            }
+        })
     }
 
     /// Makes a model of an OBJ's bytes and a picture.
     ///
     /// # Errors
     /// As [`Files::load`], without the name.
-    pub fn new(obj: &[u8], picture: Option<&image::RgbImage>) -> anyhow::Result<Self> {
-        let obj = obj::parse(obj)?;
+    pub fn new(obj: &[u8], picture: Option<&Picture>) -> anyhow::Result<Self> {
+        let pixels = picture.map(|picture| &picture.pixels);
+        let size = obj.len();
+        let other = |error| match kind::name(obj, Some(size)) {
+            Some(kind) => anyhow!(
+                "its content is {kind}, not a Wavefront OBJ; {}",
+                remedy(&kind)
+            ),
+            None => error,
+        };
+        // A page may hold the text of an OBJ.
+        if obj.trim_ascii_start().starts_with(b"<") {
+            return Err(other(anyhow!("it is no OBJ")));
+        }
+        let obj = obj::parse(obj).map_err(|error| other(error.into()))?;
         let pattern = Entry::parse(PATTERN).expect("it is in the catalogue");
         let mut painted = Box::new([0; MAX_TEXELS]);
         let painted = pattern.paint(&mut painted)[0];
         let pattern = pattern.scene(&[]);
         let (side_u, side_v) = (painted.width().into(), painted.height().into());
-        let size = picture.map_or((side_u, side_v), image::RgbImage::dimensions);
-        let (solid, layout) = solid(&obj, size)?;
-        let reduced = picture.map(|picture| {
-            let texels = layout.cut_scaled(picture);
+        let size = pixels.map_or((side_u, side_v), image::RgbImage::dimensions);
+        let made = solid(&obj, size);
+        let (solid, layout) = match made {
+            Err(error) if obj.faces.is_empty() => return Err(other(error)),
+            made => made?,
+        };
+        let reduced = pixels.map(|pixels| {
+            let texels = layout.cut_scaled(pixels);
             colour::reduce(&texels, layout.size().0.into())
         });
         let (texels, colours) = match &reduced {
@@ -160,7 +190,7 @@ impl Model {
         // What the kernel would refuse must not go on a way of seconds to be told so.
         Pack::parse(&bytes).context("its pack is wrong, which is this program's fault")?;
         Ok(Self {
-            about: about(&obj, &solid, (width, height), picture.is_some()),
+            about: about(&obj, &solid, (width, height), picture),
             bytes,
         })
     }
@@ -187,18 +217,47 @@ pub fn solid(obj: &Obj, picture: (u32, u32)) -> anyhow::Result<(Solid, Layout)> 
     Ok((polygons.solid(&layout)?, layout))
 }
 
-/// What became of the files, in a line.
-fn about(obj: &Obj, solid: &Solid, (width, height): (u16, u16), textured: bool) -> String {
+/// Reads an OBJ's bytes.
+fn read_obj(path: &Path) -> anyhow::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
+        .context("it cannot be read")?;
+    if bytes.len() as u64 > MAX_BYTES {
+        let what = match kind::name(&bytes, None) {
+            Some(kind) => format!("its content is {kind}"),
+            None => obj::SIMPLIFY.into(),
+        };
+        bail!("it has more than {MAX_BYTES} bytes; {what}");
+    }
+    Ok(bytes)
+}
+
+/// What to do about a model of another format.
+fn remedy(kind: &str) -> &'static str {
+    match kind {
+        "PNG" => "a picture goes behind --texture",
+        kind if kind.ends_with("text") => "save it as UTF-8",
+        kind if kind.contains("MTL") => "give the OBJ file that goes with it",
+        _ => "export the model as an OBJ",
+    }
+}
+
+/// What became of the files: a line, and a line for each thing that the user may not expect.
+fn about(
+    obj: &Obj,
+    solid: &Solid,
+    (width, height): (u16, u16),
+    picture: Option<&Picture>,
+) -> String {
     let Tally {
         degenerate,
         cut,
         projected,
     } = solid.tally;
-    let mut about = format!(
-        "{} vertices, {} faces",
-        solid.vertices.len(),
-        solid.faces.len()
-    );
+    let faces = solid.faces.len();
+    let s = if faces == 1 { "" } else { "s" };
+    let mut about = format!("{} vertices, {faces} face{s}", solid.vertices.len());
     let of = obj.faces.len();
     for (count, what) in [
         (cut, "cut into triangles"),
@@ -209,9 +268,23 @@ fn about(obj: &Obj, solid: &Solid, (width, height): (u16, u16), textured: bool) 
             about += &format!(", {count} of the file's {of} {what}");
         }
     }
-    if obj.undrawn > 0 {
-        about += &format!(", {} points, lines and curves left out", obj.undrawn);
+    if obj.left_out.count > 0 {
+        about += &format!(", {}", obj.left_out);
     }
-    let whose = if textured { "" } else { " of our own" };
-    about + &format!(", texture{whose} {width} x {height}")
+    let whose = if picture.is_some() { "" } else { " of our own" };
+    about += &format!(", texture{whose} {width} x {height}");
+    if picture.is_some_and(|picture| picture.transparent) {
+        about += ", transparent parts drawn over grey (808080)";
+    }
+    let turned = match solid.turned() {
+        Turned::Seen => return about,
+        Turned::Inside => "every face looks inward, so the model is inside out",
+        Turned::Away => "every face looks away in the first frame",
+    };
+    about
+        + &format!(
+            "\nnote: {turned}. A face's front is the side from which its corners run \
+             counter-clockwise. To turn the faces, reverse their corners (flip the normals) in the \
+             program that made the model."
+        )
 }

@@ -26,9 +26,9 @@ use anyhow::ensure;
 use earcut::Earcut;
 use earcut::utils3d::project3d_to_2d;
 use pack::MAX_ALL_CORNERS;
-use scene::{Corner, Face, MAX_CORNERS, MAX_FACES, MAX_VERTICES, Vec3};
+use scene::{Corner, Face, MAX_CORNERS, MAX_FACES, MAX_VERTICES, Pose, Vec3};
 
-use super::obj::Obj;
+use super::obj::{BadLine, Obj, SIMPLIFY};
 use super::texture::Layout;
 
 /// Of the ball that holds the model, in units. From the default distance of 2.95 units its outline
@@ -55,6 +55,46 @@ pub struct Solid {
     pub faces: Vec<Face>,
     /// What became of the file's faces.
     pub tally: Tally,
+}
+
+/// Whether a solid's faces look to where they are seen from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Turned {
+    /// Some do.
+    Seen,
+    /// All look to the side that the solid's middle is on: it is inside out.
+    Inside,
+    /// None looks to the viewer in the first frame.
+    Away,
+}
+
+impl Solid {
+    /// Finds out whether the faces were made with the other winding rule.
+    pub fn turned(&self) -> Turned {
+        let pose = Pose::at_tick(0);
+        let turn = pose.orientation();
+        let (mut inside, mut away) = (true, true);
+        let mut corners = &self.corners[..];
+        for face in &self.faces {
+            let (own, rest) = corners.split_at(face.corners.into());
+            corners = rest;
+            // Any point of its plane does; the face may be bent, so the middle of its corners.
+            let vertex = |corner: &Corner| self.vertices[usize::from(corner.vertex)];
+            let sum = own.iter().map(vertex).fold([0.0; 3], |sum, at| {
+                [0, 1, 2].map(|k| sum[k] + f64::from(at[k]))
+            });
+            let middle = sum.map(|k| k / f64::from(face.corners));
+            inside &= dot(middle, face.normal.map(f64::from)) < 0.0;
+            let seen = turn.turn(middle.map(|k| k.round() as i32)).map(f64::from);
+            let from_eye = [seen[0], seen[1], seen[2] + f64::from(pose.distance)];
+            away &= dot(from_eye, turn.turn(face.normal).map(f64::from)) >= 0.0;
+        }
+        match (inside, away) {
+            (true, _) => Turned::Inside,
+            (_, true) => Turned::Away,
+            _ => Turned::Seen,
+        }
+    }
 }
 
 /// What became of the file's faces.
@@ -135,10 +175,16 @@ impl Polygons {
     /// # Errors
     /// No face with an area, or more vertices than a mesh may have.
     pub fn new(obj: &Obj) -> anyhow::Result<Self> {
-        ensure!(!obj.faces.is_empty(), "it has no faces");
+        ensure!(
+            !obj.faces.is_empty(),
+            "it has no faces (lines such as 'f 1 2 3'), {} vertices, and {}; export the model as \
+             polygons",
+            obj.positions.len(),
+            obj.left_out
+        );
         let corners = obj.corners.iter();
         let used: Vec<_> = corners
-            .map(|corner| obj.positions[corner.position])
+            .map(|corner| obj.positions[corner.position as usize])
             .collect();
         let centre = [0, 1, 2].map(|k| {
             let along = used.iter().map(|position| position[k]);
@@ -165,7 +211,7 @@ impl Polygons {
                 // Counter-clockwise in the file.
                 .rev()
                 .map(|corner| {
-                    let point = on_grid(obj.positions[corner.position]);
+                    let point = on_grid(obj.positions[corner.position as usize]);
                     let vertex = *known.entry(point).or_insert_with(|| {
                         this.vertices.push(point);
                         this.vertices.len() - 1
@@ -175,7 +221,7 @@ impl Polygons {
                         at: point.map(f64::from),
                         // v is up in the file.
                         uv: corner.place.map_or([f64::NAN; 2], |place| {
-                            let [u, v] = obj.places[place];
+                            let [u, v] = obj.places[place as usize];
                             [u, -v]
                         }),
                     }
@@ -199,16 +245,29 @@ impl Polygons {
                 this.tally.projected += 1;
             }
             this.polygons.push(polygon);
+            for (what, count, most, all) in [
+                ("faces", this.polygons.len(), MAX_FACES, obj.faces.len()),
+                (
+                    "vertices",
+                    this.vertices.len(),
+                    MAX_VERTICES,
+                    obj.positions.len(),
+                ),
+            ] {
+                if count > most {
+                    let why = format!(
+                        "with this face the model has more than {most} {what} (the file has \
+                         {all}); {SIMPLIFY}"
+                    );
+                    let line = face.line;
+                    return Err(BadLine { line, why }.into());
+                }
+            }
         }
         ensure!(
             !this.polygons.is_empty(),
-            "none of its {} faces has an area",
+            "none of its {} faces has an area; check its vertices",
             obj.faces.len()
-        );
-        ensure!(
-            this.vertices.len() <= MAX_VERTICES,
-            "it has {} vertices; a model has at most {MAX_VERTICES}: {SIMPLIFY}",
-            this.vertices.len(),
         );
         Ok(this)
     }
@@ -258,24 +317,23 @@ impl Polygons {
                         .for_each(|triangle| add(&mut triangle.iter().copied()));
                 }
             }
+            if solid.faces.len() > MAX_FACES || solid.corners.len() > MAX_ALL_CORNERS {
+                let why = format!(
+                    "with this face cut into triangles the model has more than {MAX_FACES} faces \
+                     or {MAX_ALL_CORNERS} corners (the file has {} faces); {SIMPLIFY}",
+                    self.polygons.len() + self.tally.degenerate,
+                );
+                let line = polygon.line;
+                return Err(BadLine { line, why }.into());
+            }
         }
         ensure!(
-            solid.faces.len() <= MAX_FACES && solid.corners.len() <= MAX_ALL_CORNERS,
-            "its {} faces make {} flat convex ones with {} corners; a model has at most {MAX_FACES} \
-             with {MAX_ALL_CORNERS}: {SIMPLIFY}",
-            self.polygons.len() + self.tally.degenerate,
-            solid.faces.len(),
-            solid.corners.len(),
-        );
-        ensure!(
             !solid.faces.is_empty(),
-            "none of its faces can be cut into triangles"
+            "none of its faces can be cut into triangles; {SIMPLIFY}"
         );
         Ok(solid)
     }
 }
-
-const SIMPLIFY: &str = "simplify it in the program that made it";
 
 /// Of a polygon that stays whole, the corner to begin with; nothing if it has to be cut.
 fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Option<usize> {

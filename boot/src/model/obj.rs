@@ -1,76 +1,75 @@
 //! Wavefront OBJ files: positions, places in a texture, and faces of any size.
 //!
-//! A parser of our own, because what is asked of it is the line of everything that is wrong, and
-//! none of the libraries tells it: tobj's errors name neither line nor value, obj-rs panics at legal
-//! statements (`unimplemented!`), and wavefront_obj has line numbers, but refuses negative indices
-//! and cuts every face to a fan. What would be left for them to do is to split lines into words.
+//! This is our own parser, because it must name the line of every error, and no library does that:
+//! tobj's errors have neither line nor value, obj-rs panics at legal statements (`unimplemented!`),
+//! and wavefront_obj refuses negative indices and cuts every face to a fan. A library would save us
+//! the splitting of lines into words.
 //!
-//! Of the format all statements are known, and what is not a polygon (points, lines, curves and
-//! surfaces of free form) is counted and left out. Normals are checked and not used: faces are flat.
-//! Materials are not read.
+//! # What is read
+//!
+//! Only what a face uses is read, so only that can be refused. Faces are read first. Then the
+//! positions and places that they name are read, and no others: a vertex that no face uses may
+//! have any words for numbers. Normals are never read, neither their numbers nor their indices:
+//! faces are flat. Names, groups and materials are skipped. All other statements (points, lines,
+//! curves, tags of other programs) are left out and counted.
+//!
+//! # Lines
+//!
+//! CR, LF or CR LF ends a line, in any mix. Spaces, tabs, vertical tabs and form feeds separate
+//! words. A word that begins with `#` begins a comment. A `\` at the end of a line, blanks behind
+//! it or not, joins the next line to it, unless that begins with a keyword: then the `\` is the end
+//! of a name (`usemtl mats\`).
 
+use std::borrow::Cow;
 use std::fmt;
 
-/// Furthest coordinate, either sign: a model's size is squared on the way.
-const MAX_COORDINATE: f64 = 1e30;
+use scene::MAX_VERTICES;
 
-/// The statements that make no polygon, and that are no loss: names, groups, materials, normals.
-const IGNORED: [&str; 26] = [
-    "bevel",
-    "bmat",
-    "c_interp",
-    "call",
-    "csh",
-    "cstype",
-    "ctech",
-    "d_interp",
-    "deg",
-    "end",
-    "g",
-    "lod",
-    "maplib",
-    "mg",
-    "mtllib",
-    "o",
-    "parm",
-    "res",
-    "s",
-    "shadow_obj",
-    "step",
-    "stech",
-    "trace_obj",
-    "usemap",
-    "usemtl",
-    "vp",
+use crate::quote::quoted;
+
+/// Largest coordinate, either sign: a model's size is squared on the way.
+const MAX_COORDINATE: f64 = 1e30;
+/// Most corners of a face: those of an outline that is extruded, so that a mesh has room for it
+/// twice. Cutting a face that runs over the same points again and again takes a time that grows
+/// with the cube of its corners: seconds for so many, 329 s for 16 000.
+pub const MAX_CORNERS: usize = MAX_VERTICES / 2;
+/// Most faces of a file, and most corners of all of them. A mesh has room for far fewer; the rest
+/// may have no area. The limits bound the memory that a file can ask for.
+const MAX_READ: usize = 1 << 20;
+const MAX_READ_CORNERS: usize = 4 * MAX_READ;
+
+/// The statements that are skipped without a word: names, groups, smoothing, materials, normals.
+const SKIPPED: [&[u8]; 6] = [b"g", b"mtllib", b"o", b"s", b"usemtl", b"vn"];
+/// The keywords that begin a statement, whatever the line before ends in: those that files have.
+const KEYWORDS: [&[u8]; 13] = [
+    b"f", b"fo", b"g", b"l", b"mtllib", b"o", b"p", b"s", b"usemtl", b"v", b"vn", b"vp", b"vt",
 ];
-/// The statements of things that can be seen, and that are not drawn.
-const UNDRAWN: [&str; 14] = [
-    "bsp", "bzp", "cdc", "cdp", "con", "curv", "curv2", "hole", "l", "p", "scrv", "sp", "surf",
-    "trim",
-];
+/// How many kinds of statements that are left out are told apart.
+const KINDS: usize = 6;
 
 /// What an OBJ file has of polygons.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Obj {
-    /// x right, y up, z towards the viewer; finite.
+    /// x right, y up, z towards the viewer; finite. Zeros where no face uses it.
     pub positions: Vec<[f64; 3]>,
-    /// Places in the texture: u to the right, v up, one being the whole of it; finite.
+    /// Places in the texture: u to the right, v up, one being the whole of it; finite. Zeros where
+    /// no face uses it.
     pub places: Vec<[f64; 2]>,
     /// Corners of all faces.
     pub corners: Vec<Corner>,
     /// Faces.
     pub faces: Vec<Face>,
-    /// Points, lines, curves and surfaces of free form.
-    pub undrawn: usize,
+    /// The statements that are not known, or make no polygon.
+    pub left_out: LeftOut,
 }
 
 /// A corner of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Corner {
     /// Which of the positions.
-    pub position: usize,
-    /// Which of the places, if it has one.
-    pub place: Option<usize>,
+    pub position: u32,
+    /// Which of the places. Either all corners of a face have one, or none has.
+    pub place: Option<u32>,
 }
 
 /// A polygon, counter-clockwise as it is seen from its front.
@@ -78,10 +77,53 @@ pub struct Corner {
 pub struct Face {
     /// Its first corner.
     pub first: usize,
-    /// How many corners; any number.
+    /// How many corners, at most [`MAX_CORNERS`].
     pub corners: usize,
     /// The line that it is on, counted from 1.
     pub line: usize,
+}
+
+/// The statements that were left out.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct LeftOut {
+    /// How many.
+    pub count: usize,
+    /// The first keywords in the order of the file, the first line and the number of each.
+    pub kinds: Vec<(String, usize, usize)>,
+}
+
+impl LeftOut {
+    fn add(&mut self, keyword: &[u8], line: usize) {
+        self.count += 1;
+        let keyword = quoted(keyword);
+        let known = self.kinds.iter_mut().find(|(known, ..)| *known == keyword);
+        if let Some((.., count)) = known {
+            *count += 1;
+        } else if self.kinds.len() < KINDS {
+            self.kinds.push((keyword, line, 1));
+        }
+    }
+}
+
+/// Says how many statements there are, and of which kinds.
+impl fmt::Display for LeftOut {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let s = if self.count == 1 { "" } else { "s" };
+        write!(f, "{} statement{s} left out", self.count)?;
+        if self.count == 0 {
+            return Ok(());
+        }
+        write!(f, " (")?;
+        for (i, (keyword, _, count)) in self.kinds.iter().enumerate() {
+            let comma = if i == 0 { "" } else { ", " };
+            write!(f, "{comma}{count} {keyword}")?;
+        }
+        let named: usize = self.kinds.iter().map(|(.., count)| count).sum();
+        match self.count - named {
+            0 => write!(f, ")"),
+            others => write!(f, ", {others} others)"),
+        }
+    }
 }
 
 impl Obj {
@@ -96,7 +138,7 @@ impl Obj {
 pub struct BadLine {
     /// The line, counted from 1; of a statement over several lines the first.
     pub line: usize,
-    /// What is wrong with it.
+    /// What is wrong with it, and what to do.
     pub why: String,
 }
 
@@ -111,191 +153,363 @@ impl std::error::Error for BadLine {}
 /// Reads a file's bytes. They need not be UTF-8: names are in any encoding.
 ///
 /// # Errors
-/// The first line that is wrong; of indices that are too large, the first face with one.
+/// The first face that is wrong; then the first position or place that is wrong and that a face
+/// uses. Of a file without faces, which is no model, the first line that no OBJ has.
 pub fn parse(bytes: &[u8]) -> Result<Obj, BadLine> {
-    let mut reader = Reader::default();
-    let mut statement = Vec::new();
-    let mut first = 1;
-    for (number, line) in (1..).zip(bytes.split(|&byte| byte == b'\n')) {
-        if line.contains(&0) {
-            return Err(BadLine {
-                line: number,
-                why: "it has a zero byte: this is no text, and no OBJ".into(),
-            });
-        }
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        if statement.is_empty() {
-            first = number;
-        }
-        // A comment ends with its line, whatever that ends in.
-        match line.iter().position(|&byte| byte == b'#') {
-            Some(comment) => statement.extend_from_slice(&line[..comment]),
-            None => {
-                if let Some(continued) = line.strip_suffix(b"\\") {
-                    statement.extend_from_slice(continued);
-                    statement.push(b' ');
-                    continue;
-                }
-                statement.extend_from_slice(line);
-            }
-        }
-        reader
-            .statement(first, &String::from_utf8_lossy(&statement))
-            .map_err(|why| BadLine { line: first, why })?;
-        statement.clear();
+    let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
+    let mut obj = Obj::default();
+    let counts = faces(bytes, &mut obj)?;
+    let mut used = used(&obj, counts)?;
+    if !obj.faces.is_empty() {
+        coordinates(bytes, &mut obj, &used)?;
+        return Ok(obj);
     }
-    if !statement.is_empty() {
-        return Err(BadLine {
-            line: first,
-            why: "it goes on in a next line, and there is none".into(),
-        });
+    used.positions.fill(true);
+    used.places.fill(true);
+    let wrong = coordinates(bytes, &mut obj, &used).err();
+    let unknown = obj.left_out.kinds.first();
+    let unknown = unknown.map(|(keyword, line, _)| BadLine {
+        line: *line,
+        why: format!(
+            "{keyword} is not a statement of a Wavefront OBJ, and the file has no faces; give an \
+             OBJ file"
+        ),
+    });
+    match (wrong, unknown) {
+        (Some(wrong), Some(unknown)) if unknown.line < wrong.line => Err(unknown),
+        (Some(wrong), _) => Err(wrong),
+        // Text of another kind.
+        (None, Some(unknown)) if counts.positions == 0 => Err(unknown),
+        // Points or lines.
+        _ => Ok(obj),
     }
-    reader.whole()
 }
 
-#[derive(Default)]
-struct Reader {
-    obj: Obj,
-    normals: usize,
-    /// The largest index of a normal, counted from 1, and the line that it is on.
-    last_normal: (usize, usize),
+/// How many there are of each, or which of each.
+#[derive(Clone, Copy, Debug, Default)]
+struct Each<T> {
+    positions: T,
+    places: T,
 }
 
-impl Reader {
-    fn statement(&mut self, line: usize, text: &str) -> Result<(), String> {
-        let mut words = text.split_ascii_whitespace();
+/// Reads the faces, and counts what they name.
+fn faces(bytes: &[u8], obj: &mut Obj) -> Result<Each<usize>, BadLine> {
+    let mut there = Each::default();
+    for statement in Statements::new(bytes) {
+        let line = statement.line;
+        let wrong = |why| BadLine { line, why };
+        let mut words = words(&statement.text);
         let Some(keyword) = words.next() else {
-            return Ok(());
+            continue;
         };
         match keyword {
-            // After the coordinates there may be a weight, or a colour.
-            "v" => {
-                let [x, y, z] = numbers(keyword, &mut words, 3)?;
-                self.obj.positions.push([x, y, z]);
-            }
-            // After u and v there may be a depth; v may be left out.
-            "vt" => {
-                let [u, v, _] = numbers(keyword, &mut words, 1)?;
-                self.obj.places.push([u, v]);
-            }
-            "vn" => {
-                numbers(keyword, &mut words, 3)?;
-                self.normals += 1;
-            }
-            "f" | "fo" => {
-                let first = self.obj.corners.len();
-                for word in words {
-                    let corner = self.corner(line, word)?;
-                    self.obj.corners.push(corner);
+            b"v" => there.positions += 1,
+            b"vt" => there.places += 1,
+            b"f" | b"fo" => {
+                if statement.cut {
+                    let why = "the face goes on in a next line, and the file ends here; it is cut \
+                               short: save it again";
+                    return Err(wrong(why.into()));
                 }
-                let corners = self.obj.corners.len() - first;
-                self.obj.faces.push(Face {
-                    first,
-                    corners,
-                    line,
-                });
+                face(line, words, there, obj).map_err(wrong)?;
             }
-            known if IGNORED.contains(&known) => {}
-            known if UNDRAWN.contains(&known) => self.obj.undrawn += 1,
-            _ => {
-                let said: String = keyword.chars().take(20).collect();
-                return Err(format!("'{said}' is no statement of a Wavefront OBJ"));
-            }
+            skipped if SKIPPED.contains(&skipped) => {}
+            unknown => obj.left_out.add(unknown, line),
         }
-        Ok(())
     }
+    Ok(there)
+}
 
-    /// A corner: `1`, `1/2`, `1//3` or `1/2/3`.
-    fn corner(&mut self, line: usize, word: &str) -> Result<Corner, String> {
-        let mut parts = word.split('/');
-        let mut index = |what, there| match parts.next() {
-            None | Some("") => Ok(None),
-            Some(part) => from_zero(part, there)
-                .map_err(|why| format!("'{word}': {what} {why}"))
-                .map(Some),
-        };
-        let position = index("position", self.obj.positions.len())?;
-        let place = index("texture coordinate", self.obj.places.len())?;
-        let normal = index("normal", self.normals)?;
-        if parts.next().is_some() {
-            return Err(format!("'{word}' has more than three indices"));
-        }
-        if let Some(normal) = normal.filter(|&normal| normal >= self.last_normal.0) {
-            self.last_normal = (normal + 1, line);
-        }
-        let position = position.ok_or_else(|| format!("'{word}' has no position"))?;
-        Ok(Corner { position, place })
+/// Reads a face from its corners.
+fn face<'a>(
+    line: usize,
+    words: impl Iterator<Item = &'a [u8]>,
+    there: Each<usize>,
+    obj: &mut Obj,
+) -> Result<(), String> {
+    let first = obj.corners.len();
+    for word in words {
+        obj.corners.push(corner(word, there)?);
     }
+    let corners = obj.corners.len() - first;
+    if corners > MAX_CORNERS {
+        return Err(format!(
+            "the face has {corners} corners, and a face has at most {MAX_CORNERS}; {SIMPLIFY}"
+        ));
+    }
+    if obj.faces.len() == MAX_READ || obj.corners.len() > MAX_READ_CORNERS {
+        return Err(format!(
+            "here the file has {} faces and {} corners, more than the {MAX_READ} and \
+             {MAX_READ_CORNERS} that are read; {SIMPLIFY}",
+            obj.faces.len() + 1,
+            obj.corners.len(),
+        ));
+    }
+    let own = &mut obj.corners[first..];
+    if own.iter().any(|corner| corner.place.is_none()) {
+        // It gets coordinates made up, and uses none of the file's.
+        own.iter_mut().for_each(|corner| corner.place = None);
+    }
+    obj.faces.push(Face {
+        first,
+        corners,
+        line,
+    });
+    Ok(())
+}
 
-    /// The whole file, its indices compared with what there is of each.
-    fn whole(self) -> Result<Obj, BadLine> {
-        let Self {
-            obj,
-            normals,
-            last_normal,
-        } = self;
-        let beyond = |line, what: &str, index: usize, there: usize| {
-            let why = format!("{what} {index}: there are {there} of them");
-            Err(BadLine { line, why })
-        };
-        for face in &obj.faces {
-            for corner in obj.corners_of(face) {
-                if corner.position >= obj.positions.len() {
-                    let there = obj.positions.len();
-                    return beyond(face.line, "position", corner.position + 1, there);
-                }
-                if let Some(place) = corner.place.filter(|&place| place >= obj.places.len()) {
-                    let there = obj.places.len();
-                    return beyond(face.line, "texture coordinate", place + 1, there);
-                }
-            }
-        }
-        if last_normal.0 > normals {
-            return beyond(last_normal.1, "normal", last_normal.0, normals);
-        }
-        Ok(obj)
+/// What to do about a model that is too large.
+pub const SIMPLIFY: &str = "simplify it in the program that made it";
+
+/// Reads a corner: `1`, `1/2`, `1//3` or `1/2/3`. The normal's index may be anything.
+fn corner(word: &[u8], there: Each<usize>) -> Result<Corner, String> {
+    let mut parts = word.split(|&byte| byte == b'/');
+    let mut index = |what, there| match parts.next() {
+        None | Some(b"") => Ok(None),
+        Some(part) => match from_zero(part, there) {
+            Ok(index) => Ok(Some(index)),
+            Err(why) => Err(format!("{}: the {what} {why}", quoted(word))),
+        },
+    };
+    let position = index("position", there.positions)?;
+    let place = index("texture coordinate", there.places)?;
+    if parts.nth(1).is_some() {
+        return Err(format!(
+            "{} has more than three indices; write a corner as 1/2/3",
+            quoted(word)
+        ));
+    }
+    let position =
+        position.ok_or_else(|| format!("{} has no position; write it first", quoted(word)))?;
+    Ok(Corner { position, place })
+}
+
+/// An index, counted from 0. Counted from 1 in the file, it may come before what it names; below
+/// zero it counts back from the last one before it.
+fn from_zero(word: &[u8], there: usize) -> Result<u32, String> {
+    let number = std::str::from_utf8(word).ok();
+    let number = number.and_then(|word| word.parse::<i128>().ok());
+    let number = number.ok_or_else(|| format!("{} is not a whole number", quoted(word)))?;
+    match number {
+        0 => Err("0 does not exist; count from 1".into()),
+        1.. => u32::try_from(number - 1)
+            .map_err(|_| format!("{number} does not exist; correct the index")),
+        _ => usize::try_from(-number)
+            .ok()
+            .and_then(|back| there.checked_sub(back))
+            .map(|index| index as u32)
+            .ok_or_else(|| {
+                format!("{number} does not exist: {there} come before this line; correct the index")
+            }),
     }
 }
 
-/// The first three of a statement's numbers; `least` of them must be there, the others are zeros.
+/// Which positions and places the faces use.
+///
+/// # Errors
+/// The first face that uses one that does not exist.
+fn used(obj: &Obj, there: Each<usize>) -> Result<Each<Vec<bool>>, BadLine> {
+    let mut used = Each {
+        positions: vec![false; there.positions],
+        places: vec![false; there.places],
+    };
+    let mark = |used: &mut Vec<bool>, index: u32, what: &str| match used.get_mut(index as usize) {
+        Some(used) => {
+            *used = true;
+            Ok(())
+        }
+        None => Err(format!(
+            "{what} {} does not exist: the file has {}; correct the index",
+            u64::from(index) + 1,
+            used.len()
+        )),
+    };
+    for face in &obj.faces {
+        for corner in obj.corners_of(face) {
+            mark(&mut used.positions, corner.position, "position")
+                .and_then(|()| match corner.place {
+                    Some(place) => mark(&mut used.places, place, "texture coordinate"),
+                    None => Ok(()),
+                })
+                .map_err(|why| BadLine {
+                    line: face.line,
+                    why,
+                })?;
+        }
+    }
+    Ok(used)
+}
+
+/// Reads the coordinates that are used.
+fn coordinates(bytes: &[u8], obj: &mut Obj, used: &Each<Vec<bool>>) -> Result<(), BadLine> {
+    // Zeroed memory that is never written is never taken.
+    obj.positions = vec![[0.0; 3]; used.positions.len()];
+    obj.places = vec![[0.0; 2]; used.places.len()];
+    let mut positions = obj.positions.iter_mut().zip(&used.positions);
+    let mut places = obj.places.iter_mut().zip(&used.places);
+    for statement in Statements::new(bytes) {
+        let mut words = words(&statement.text);
+        let read = match words.next() {
+            // Behind the coordinates there may be a weight, or a colour.
+            Some(b"v") => match positions.next() {
+                Some((position, true)) => numbers("v", words, position, 3),
+                _ => Ok(()),
+            },
+            // v may be missing; behind it there may be a depth.
+            Some(b"vt") => match places.next() {
+                Some((place, true)) => numbers("vt", words, place, 1),
+                _ => Ok(()),
+            },
+            _ => Ok(()),
+        };
+        read.map_err(|why| BadLine {
+            line: statement.line,
+            why,
+        })?;
+    }
+    Ok(())
+}
+
+/// Reads a statement's first numbers; `least` of them must exist, the others stay zeros.
 fn numbers<'a>(
     keyword: &str,
-    words: &mut impl Iterator<Item = &'a str>,
+    mut words: impl Iterator<Item = &'a [u8]>,
+    numbers: &mut [f64],
     least: usize,
-) -> Result<[f64; 3], String> {
-    let mut numbers = [0.0; 3];
+) -> Result<(), String> {
     for (i, number) in numbers.iter_mut().enumerate() {
         let Some(word) = words.next() else {
             if i >= least {
                 break;
             }
-            return Err(format!("'{keyword}' has {i} numbers; it takes {least}"));
+            return Err(format!(
+                "'{keyword}' has {i} of its {least} numbers; add the others"
+            ));
         };
-        let parsed = word.parse::<f64>();
-        *number = parsed.map_err(|_| format!("'{word}' is no number"))?;
-        if !number.is_finite() {
-            return Err(format!("'{word}' is not finite"));
-        }
-        if number.abs() > MAX_COORDINATE {
-            return Err(format!("{word} is beyond +-{MAX_COORDINATE:e}"));
-        }
+        *number = self::number(word)?;
     }
-    Ok(numbers)
+    Ok(())
 }
 
-/// An index, counted from 0. Counted from 1 in the file, it may come before what it names; below
-/// zero it counts back from the last one before it.
-fn from_zero(word: &str, there: usize) -> Result<usize, String> {
-    let number: i64 = word
-        .parse()
-        .map_err(|_| format!("'{word}' is no whole number"))?;
-    match number {
-        0 => Err("0: they are counted from 1".into()),
-        1.. => Ok((number - 1) as usize),
-        _ => usize::try_from(number.unsigned_abs())
-            .ok()
-            .and_then(|back| there.checked_sub(back))
-            .ok_or_else(|| format!("{number}: there are {there} before it")),
+/// Reads a number.
+fn number(word: &[u8]) -> Result<f64, String> {
+    let parse = |text: &str| text.parse::<f64>().ok();
+    let text = std::str::from_utf8(word).unwrap_or_default();
+    let Some(number) = parse(text) else {
+        let hint = match parse(&text.replacen(',', ".", 1)) {
+            Some(_) => "write a point, not a comma",
+            None => "write digits, like -0.5 or 1e-3",
+        };
+        return Err(format!("{} is not a number; {hint}", quoted(word)));
+    };
+    if number.is_nan() || number.abs() > MAX_COORDINATE {
+        return Err(format!(
+            "{} is not within +-{MAX_COORDINATE:e}; correct or remove it",
+            quoted(word)
+        ));
+    }
+    Ok(number)
+}
+
+/// Whether a byte separates words.
+fn is_blank(byte: &u8) -> bool {
+    matches!(byte, b' ' | b'\t' | 0x0B | 0x0C)
+}
+
+/// The words of a statement, up to a comment.
+fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    text.split(is_blank)
+        .filter(|word| !word.is_empty())
+        .take_while(|word| word[0] != b'#')
+}
+
+/// A statement, its lines joined.
+struct Statement<'a> {
+    text: Cow<'a, [u8]>,
+    /// Its first line, counted from 1.
+    line: usize,
+    /// The file ends where it goes on.
+    cut: bool,
+}
+
+/// Takes the statements off the front of a file.
+struct Statements<'a> {
+    rest: Option<&'a [u8]>,
+    line: usize,
+}
+
+impl<'a> Statements<'a> {
+    fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            rest: Some(bytes),
+            line: 0,
+        }
+    }
+
+    /// The next line, without its end.
+    fn line(&mut self) -> Option<&'a [u8]> {
+        let rest = self.rest?;
+        self.line += 1;
+        let end = rest.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+        let Some(end) = end else {
+            self.rest = None;
+            return Some(rest);
+        };
+        let (line, after) = rest.split_at(end);
+        self.rest = Some(after.strip_prefix(b"\r\n").unwrap_or(&after[1..]));
+        Some(line)
+    }
+
+    /// Whether the next line begins a statement of its own.
+    fn begins_anew(&self) -> bool {
+        let next = self.rest.unwrap_or_default();
+        let end = next.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
+        let next = &next[..end.unwrap_or(next.len())];
+        words(next)
+            .next()
+            .is_some_and(|word| KEYWORDS.contains(&word))
+    }
+}
+
+/// A line without the `\` at its end, if it has one and is no comment.
+fn continued(line: &[u8]) -> Option<&[u8]> {
+    let blanks = line.iter().rev().take_while(|byte| is_blank(byte)).count();
+    let whole = line[..line.len() - blanks].strip_suffix(b"\\")?;
+    // A comment ends with its line, whatever that ends in.
+    let comment = line.split(is_blank).any(|word| word.first() == Some(&b'#'));
+    (!comment).then_some(whole)
+}
+
+impl<'a> Iterator for Statements<'a> {
+    type Item = Statement<'a>;
+
+    fn next(&mut self) -> Option<Statement<'a>> {
+        let mut text = self.line().map(Cow::Borrowed)?;
+        let line = self.line;
+        let mut from = 0;
+        while let Some(whole) = continued(&text[from..]) {
+            let whole = from + whole.len();
+            let joined = text.to_mut();
+            joined.truncate(whole);
+            if self.begins_anew() {
+                break;
+            }
+            let Some(next) = self.line() else {
+                return Some(Statement {
+                    text,
+                    line,
+                    cut: true,
+                });
+            };
+            joined.push(b' ');
+            from = joined.len();
+            joined.extend_from_slice(next);
+        }
+        Some(Statement {
+            text,
+            line,
+            cut: false,
+        })
     }
 }
 
@@ -303,7 +517,7 @@ fn from_zero(word: &str, there: usize) -> Result<usize, String> {
 mod tests {
     use super::*;
 
-    fn corner(position: usize, place: Option<usize>) -> Corner {
+    fn corner(position: u32, place: Option<u32>) -> Corner {
         Corner { position, place }
     }
 
@@ -323,84 +537,258 @@ mod tests {
               f 1//1 -1//-1 3//1\n\
               f -4/-3/1 -3/-2/1 -2/-1/1 4/1/1\n\
               f 5 1 2\nv 0 0 1\n\
-              l 1 2\np 1\n",
+              l 1 2\np 1\nl 2 3\n",
         )
         .unwrap();
         assert_eq!(obj.positions[2..4], [[1.0, 1.0, 0.0], [2.0, -0.5, 5.0]]);
         assert_eq!(obj.places, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
         let faces: Vec<_> = obj.faces.iter().map(|face| obj.corners_of(face)).collect();
-        let bare = |positions: [usize; 3]| positions.map(|position| corner(position, None));
+        let bare = |positions: [u32; 3]| positions.map(|position| corner(position, None));
         assert_eq!(faces[0], bare([0, 1, 2]));
         assert_eq!(faces[1], [0, 1, 2].map(|i| corner(i, Some(i))));
         assert_eq!(faces[2], bare([0, 3, 2]));
         let four = [(0, 0), (1, 1), (2, 2), (3, 0)].map(|(p, t)| corner(p, Some(t)));
         assert_eq!(faces[3], four);
         assert_eq!(faces[4], bare([4, 0, 1]));
-        assert_eq!(obj.undrawn, 2);
+        assert_eq!(
+            obj.left_out.to_string(),
+            "3 statements left out (2 'l', 1 'p')"
+        );
         let lines: Vec<_> = obj.faces.iter().map(|face| face.line).collect();
         assert_eq!(lines, [12, 13, 17, 18, 19]);
     }
 
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+
+    /// The faces and coordinates of a text that is read, without their lines.
+    fn read(text: &[u8]) -> (Vec<[f64; 3]>, Vec<[f64; 2]>, Vec<Corner>) {
+        let obj = parse(text).unwrap_or_else(|error| panic!("{}: {error}", text.escape_ascii()));
+        (obj.positions, obj.places, obj.corners)
+    }
+
+    #[test]
+    fn lines_end_in_any_way_and_blanks_are_of_any_kind() {
+        let plain = read(TRIANGLE.as_bytes());
+        for text in [
+            format!("\u{feff}{TRIANGLE}"),
+            TRIANGLE.replace('\n', "\r"),
+            TRIANGLE.replace('\n', "\r\n"),
+            TRIANGLE.replacen('\n', "\r", 3).replacen('\n', "\r\n", 2),
+            TRIANGLE.replace(' ', "\x0b\t\x0c"),
+            TRIANGLE.replace('\n', " \x0b\n"),
+            TRIANGLE.replace(" 0 0\n", " \\\n0 0\n"),
+            TRIANGLE.replace(" 0 0\n", "\\ \t\x0b\x0c\r\n0\\\r0\r\n"),
+            TRIANGLE.trim_end().into(),
+            // A name may end as a line that goes on does.
+            format!("usemtl mats\\\n{TRIANGLE}"),
+            format!("usemtl C:\\mats\\ \r\n{TRIANGLE}o \\"),
+            TRIANGLE.replace("\nv", "\\\nv"),
+            format!("g a \\\n  b c\n{TRIANGLE}"),
+            format!("{TRIANGLE}vn 0 0 \\"),
+        ] {
+            assert_eq!(read(text.as_bytes()), plain, "{text:?}");
+        }
+        for (text, line) in [
+            ("\r\rf 0", 3),
+            ("\r\n\r\nf 0", 3),
+            ("\n\r\nf 0", 3),
+            ("a\r\nb\rc\nf 0", 4),
+            ("\n\rf 0", 3),
+            ("usemtl mats\\\nv 0 0 0\nf 0", 3),
+            ("v 0 \\\n 0 \\ \n 0\nf 1 2 \\\n 0", 4),
+        ] {
+            assert_eq!(parse(text.as_bytes()).unwrap_err().line, line, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn what_no_face_uses_refuses_no_file() {
+        let plain = read(TRIANGLE.as_bytes());
+        for more in [
+            "vn nan nan nan",
+            "vn -nan(ind) -1.#IND 1.#QNAN0",
+            "vn",
+            "vn x\0y \x1b[31m",
+            "v nan 0 0\nvt 1.#INF00",
+            "v\nvt",
+            "v 1,5 0x10 1.0abc",
+            "usemtl \0",
+            "# \0",
+        ] {
+            let (mut positions, mut places, corners) = read(format!("{TRIANGLE}{more}").as_bytes());
+            positions.truncate(3);
+            places.truncate(3);
+            assert_eq!((positions, places, corners), plain, "{more:?}");
+        }
+        for face in [
+            "f 1/1/0 2/2/99 3/3/-99",
+            "f 1/1/x 2/2/ 3/3/1.5",
+            "f 1/1/1/ 2/2 3/3",
+        ] {
+            let text = TRIANGLE.replace("f 1/1 2/2 3/3", face);
+            match face.contains("/1/1/") {
+                true => assert!(parse(text.as_bytes()).is_err()),
+                false => assert_eq!(read(text.as_bytes()), plain, "{face}"),
+            }
+        }
+        // A face with a corner that has no place gets its places made up.
+        let mixed = TRIANGLE.replace("3/3", "3").replace("vt 1 0", "vt nan");
+        let (_, _, corners) = read(mixed.as_bytes());
+        assert!(corners.iter().all(|corner| corner.place.is_none()));
+        // Behind the numbers that count anything may stand.
+        let behind = TRIANGLE.replace("v 1 0 0", "v 1 0 0 1.#J nan");
+        let behind = behind.replace("vt 1 0", "vt 1 0 -nan(ind)");
+        assert_eq!(read(behind.as_bytes()), plain);
+    }
+
+    #[test]
+    fn unknown_statements_are_counted_by_kind() {
+        let left_out = |more: &str| {
+            parse(format!("{TRIANGLE}{more}").as_bytes())
+                .unwrap()
+                .left_out
+        };
+        assert_eq!(
+            left_out("vn 1\no\ng a\ns 1\nusemtl\nmtllib a b"),
+            LeftOut::default()
+        );
+        let tagged = left_out("t crease 2/1/0 1 2 2.0");
+        assert_eq!(tagged.to_string(), "1 statement left out (1 't')");
+        assert_eq!(tagged.kinds, [("'t'".into(), 8, 1)]);
+        let many =
+            left_out("vw 1\nt\nusemap a\nvw 2\ncstype b\ncurv 1\nsurf 1\nend\nend\n\x1b[0m\n");
+        let words = "10 statements left out (2 'vw', 1 't', 1 'usemap', 1 'cstype', 1 'curv', \
+                     1 'surf', 3 others)";
+        assert_eq!(many.to_string(), words);
+        let escape = left_out("\x1b[0m").to_string();
+        assert_eq!(escape, r"1 statement left out (1 '\x1b[0m')");
+    }
+
     #[test]
     fn what_is_wrong_is_told_with_its_line() {
+        let numbers = |word: &str| format!("v 0 0 0\nv 0 0 {word}\nf 1 2 1");
+        let mut cases: Vec<(String, usize, &str)> = Vec::new();
+        for (word, why) in [
+            ("x", "'x' is not a number"),
+            ("1.#INF00", "'1.#INF00' is not a number"),
+            ("1.#QNAN0", "'1.#QNAN0' is not a number"),
+            ("-1.#IND", "'-1.#IND' is not a number"),
+            ("-nan(ind)", "'-nan(ind)' is not a number"),
+            ("1.0abc", "'1.0abc' is not a number"),
+            ("0x10", "'0x10' is not a number"),
+            ("1_0", "'1_0' is not a number"),
+            ("1,5", "'1,5' is not a number; write a point, not a comma"),
+            ("1#", "'1#' is not a number"),
+            ("1\0", "'1\\x00' is not a number"),
+            ("1\u{a0}", "'1\\u{a0}' is not a number"),
+            ("nan", "'nan' is not within +-1e30"),
+            ("-inf", "'-inf' is not within"),
+            ("infinity", "'infinity' is not within"),
+            ("1e999", "'1e999' is not within"),
+            ("1e31", "'1e31' is not within"),
+            ("", "'v' has 2 of its 3 numbers"),
+            ("#1", "'v' has 2 of its 3 numbers"),
+        ] {
+            cases.push((numbers(word), 2, why));
+        }
         for (text, line, why) in [
             (
-                "# ok\nsolid cube\n",
-                2,
-                "'solid' is no statement of a Wavefront OBJ",
+                "vt\nv 0 0 0\nf 1/1 1/1 1/1",
+                1,
+                "'vt' has 0 of its 1 numbers",
             ),
-            ("\x7fELF", 1, "'\x7fELF' is no statement"),
-            ("v 0 0\0 0", 1, "zero byte"),
-            ("v 0 0", 1, "'v' has 2 numbers; it takes 3"),
-            ("vt", 1, "'vt' has 0 numbers; it takes 1"),
-            ("v 0 0 x", 1, "'x' is no number"),
-            ("v 0 0 0\nv 0 nan 0", 2, "'nan' is not finite"),
-            ("v 0 0 -inf", 1, "'-inf' is not finite"),
-            ("v 0 0 1e999", 1, "'1e999' is not finite"),
-            ("vt NaN 0", 1, "'NaN' is not finite"),
-            ("vn 0 0 infinity", 1, "'infinity' is not finite"),
-            ("v 0 0 1e31", 1, "1e31 is beyond +-1e30"),
-            ("v 0 0 0\n\nf 1 1 2\n", 3, "position 2: there are 1 of them"),
+            ("vt NaN 0\nv 0 0 0\nf 1/1 1/1 1/1", 1, "'NaN' is not within"),
+            (
+                "v 0 0 0\n\nf 1 1 2\n",
+                3,
+                "position 2 does not exist: the file has 1",
+            ),
             (
                 "v 0 0 0\nf 0 1 1",
                 2,
-                "'0': position 0: they are counted from 1",
+                "'0': the position 0 does not exist; count from 1",
             ),
             (
                 "v 0 0 0\nf 1 -2 1",
                 2,
-                "'-2': position -2: there are 1 before it",
+                "'-2': the position -2 does not exist: 1 come before this line",
             ),
             (
-                "v 0 0 0\nf 1/1 1 1",
+                "v 0 0 0\nf 1/1 1/1 1/1",
                 2,
-                "texture coordinate 1: there are 0 of them",
+                "texture coordinate 1 does not exist: the file has 0",
             ),
-            ("v 0 0 0\nf 1//4 1 1", 2, "normal 4: there are 0 of them"),
             (
                 "v 0 0 0\nf 1/-1 1 1",
                 2,
-                "texture coordinate -1: there are 0 before",
+                "the texture coordinate -1 does not exist: 0 come before",
             ),
-            ("v 0 0 0\nf 1.5 1 1", 2, "'1.5' is no whole number"),
-            ("v 0 0 0\nf a 1 1", 2, "'a' is no whole number"),
+            ("v 0 0 0\nf 1.5 1 1", 2, "'1.5' is not a whole number"),
+            ("v 0 0 0\nf a 1 1", 2, "'a' is not a whole number"),
             ("v 0 0 0\nf /1 1 1", 2, "'/1' has no position"),
             ("v 0 0 0\nf 1/1/1/1 1 1", 2, "more than three indices"),
             (
                 "v 0 0 0\nf 99999999999999999999 1 1",
                 2,
-                "is no whole number",
+                "99999999999999999999 does not exist",
+            ),
+            (
+                "v 0 0 0\nf 4294967296 1 1",
+                2,
+                "4294967296 does not exist: the file has 1",
             ),
             (
                 "v 0 0 0\nf 1 -9223372036854775808 1",
                 2,
-                "there are 1 before it",
+                "1 come before this line",
             ),
-            ("\nv 0 \\\n0 \\", 2, "goes on in a next line"),
+            ("\nf 1 1\\\n 1 \\", 2, "the file ends here"),
+            // No faces: the first line that is none of an OBJ's.
+            (
+                "# a\nhello\nworld",
+                2,
+                "'hello' is not a statement of a Wavefront OBJ",
+            ),
+            ("hello\nv for vendetta", 1, "'hello' is not a statement"),
+            ("v for vendetta\nhello", 1, "'for' is not a number"),
+            ("\x7fELF\0", 1, "'\\x7fELF\\x00' is not a statement"),
         ] {
+            cases.push((text.into(), line, why));
+        }
+        for (text, line, why) in cases {
             let error = parse(text.as_bytes()).unwrap_err();
             assert!(error.why.contains(why), "{text:?}: {error}");
             assert_eq!(error.line, line, "{text:?}: {error}");
         }
+    }
+
+    #[test]
+    fn limits_refuse_what_would_take_memory_or_time() {
+        let corners = |count: usize| format!("v 0 0 0\nf{}\n", " 1".repeat(count));
+        assert!(parse(corners(MAX_CORNERS).as_bytes()).is_ok());
+        let error = parse(corners(MAX_CORNERS + 1).as_bytes()).unwrap_err();
+        assert!(
+            error
+                .why
+                .starts_with("the face has 2049 corners, and a face has at most 2048;")
+        );
+        assert_eq!(error.line, 2);
+        let error =
+            parse(format!("v 0 0 0\n{}", "f\n".repeat(MAX_READ + 1)).as_bytes()).unwrap_err();
+        assert_eq!(error.line, MAX_READ + 2);
+        assert!(
+            error
+                .why
+                .starts_with("here the file has 1048577 faces and 0 corners"),
+            "{error}"
+        );
+        let face = format!("f{}\n", " 1".repeat(MAX_CORNERS));
+        let error = parse(format!("v 0 0 0\n{}", face.repeat(2050)).as_bytes()).unwrap_err();
+        assert!(
+            error
+                .why
+                .contains("more than the 1048576 and 4194304 that are read"),
+            "{error}"
+        );
     }
 }

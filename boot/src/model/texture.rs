@@ -9,16 +9,23 @@
 
 use std::io::{BufRead, Seek};
 
-use anyhow::{Context, ensure};
-use image::codecs::png::PngDecoder;
+use anyhow::{Context, anyhow, bail, ensure};
 use image::imageops::{FilterType, resize};
-use image::{DynamicImage, ImageDecoder, Rgb, RgbImage};
+use image::{Rgb, RgbImage};
+use png::{BitDepth, ColorType, Decoder, Transformations};
 
+use super::kind;
 use super::mesh::Polygon;
 use super::obj::BadLine;
+use crate::quote::quoted;
 
-/// Longest side of a PNG that is read, in pixels: its pixels take up to half a GiB.
+/// How every PNG begins.
+const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
+/// Longest side of a PNG that is read, in pixels: its pixels take up to a quarter of a GiB.
 pub const MAX_PIXELS: u32 = 8192;
+/// The colour beneath a picture's transparent parts. Black writing and white writing without a
+/// ground both stay readable on grey.
+pub const GROUND: [u8; 3] = [128; 3];
 /// Most times that a face may repeat the texture: then four texels are left of it.
 const MAX_REPEATS: f64 = 64.0;
 /// So far a coordinate may be beyond a border of the texture, in textures, and is taken to mean the
@@ -27,20 +34,109 @@ const SLACK: f64 = 1.0 / 512.0;
 /// One texel of a corner's place.
 const TEXEL: f64 = 65_536.0;
 
-/// Reads a PNG.
+/// A picture, opaque.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Picture {
+    /// Its pixels, laid over [`GROUND`] where they are transparent.
+    pub pixels: RgbImage,
+    /// Some of it was transparent.
+    pub transparent: bool,
+}
+
+/// Reads a PNG of any kind: of an animated one the picture that programs show which know of no
+/// animation.
+///
+/// Each pixel is laid over [`GROUND`], as far as it is transparent, before anything else is done to
+/// it. So colours that hide under full transparency reach neither the scaled texture nor its palette.
 ///
 /// # Errors
-/// What is no whole PNG, or is larger than [`MAX_PIXELS`].
-pub fn read(from: impl BufRead + Seek) -> anyhow::Result<RgbImage> {
+/// Another format, by name; a damaged PNG; one that is larger than [`MAX_PIXELS`].
+pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
+    let begin = from.fill_buf().context("it cannot be read")?;
+    if !begin.starts_with(PNG) {
+        match kind::name(begin, None) {
+            Some(kind) => bail!("its content is {kind}, not PNG; convert it to PNG"),
+            None if begin.is_empty() => bail!("it is empty; give a PNG"),
+            None => bail!("it begins with {}, not as a PNG; give a PNG", quoted(begin)),
+        }
+    }
+    let damaged = |error| match error {
+        // This limit is on what the file says beside its pixels.
+        png::DecodingError::LimitsExceeded => {
+            anyhow!("its header or its notes ask for too much memory; save it again, without notes")
+        }
+        error => anyhow!("it is not a whole PNG: {error}; save it again"),
+    };
+    let mut decoder = Decoder::new(from);
+    decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
     // The size first: decoding takes the memory that the header asks for.
-    let decoder = PngDecoder::new(from).context("it is no PNG")?;
-    let (width, height) = decoder.dimensions();
+    let header = decoder.read_header_info().map_err(damaged)?;
+    let (width, height) = (header.width, header.height);
     ensure!(
         width <= MAX_PIXELS && height <= MAX_PIXELS,
-        "it has {width} x {height} pixels; a texture has at most {MAX_PIXELS} a side"
+        "it has {width} x {height} pixels, and a texture has at most {MAX_PIXELS} a side; scale it \
+         down"
     );
-    let picture = DynamicImage::from_decoder(decoder).context("it is no whole PNG")?;
-    Ok(picture.into_rgb8())
+    let mut reader = decoder.read_info().map_err(damaged)?;
+    let info = reader.info();
+    // The decoder panics at any other length (png 0.18.1, `create_rgba_palette`).
+    if let Some(palette) = &info.palette
+        && (palette.len() % 3 != 0 || palette.len() > 3 * 256)
+    {
+        let bytes = palette.len();
+        bail!(
+            "its palette has {bytes} bytes, not three for each of up to 256 colours; save it again"
+        );
+    }
+    let size = reader.output_buffer_size().context("it is too large")?;
+    let mut bytes = vec![0; size];
+    let frame = reader.next_frame(&mut bytes).map_err(damaged)?;
+    ensure!(
+        frame.bit_depth == BitDepth::Eight && (frame.width, frame.height) == (width, height),
+        "its first picture is not of its header's size; save it again"
+    );
+    Ok(over_ground(bytes, frame.color_type, (width, height)))
+}
+
+/// Lays a decoder's pixels, 8 bits a part, over [`GROUND`].
+fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32)) -> Picture {
+    let pixels = width as usize * height as usize;
+    let samples = colour.samples();
+    let mut transparent = false;
+    let mut pixel = |from: &[u8]| {
+        let (rgb, alpha) = match *from {
+            [grey] => ([grey; 3], 255),
+            [grey, alpha] => ([grey; 3], alpha),
+            [r, g, b] => ([r, g, b], 255),
+            [r, g, b, alpha] => ([r, g, b], alpha),
+            _ => unreachable!("a pixel has one to four parts"),
+        };
+        transparent |= alpha < 255;
+        let alpha = u32::from(alpha);
+        let blend = |over: u8, ground: u8| {
+            let sum = u32::from(over) * alpha + u32::from(ground) * (255 - alpha);
+            ((sum + 127) / 255) as u8
+        };
+        [0, 1, 2].map(|k| blend(rgb[k], GROUND[k]))
+    };
+    if samples < 3 {
+        let rgb = bytes.chunks_exact(samples).flat_map(&mut pixel).collect();
+        bytes = rgb;
+    } else {
+        // In place: of the largest picture a copy is a fifth of a GiB.
+        for i in 0..pixels {
+            let rgb = pixel(&bytes[i * samples..][..samples]);
+            bytes[3 * i..][..3].copy_from_slice(&rgb);
+        }
+    }
+    bytes.truncate(3 * pixels);
+    let pixels = RgbImage::from_raw(width, height, bytes);
+    Picture {
+        pixels: pixels.expect("three bytes a pixel"),
+        transparent,
+    }
 }
 
 /// What is cut from the plane of repeated pictures, along one axis.
@@ -123,8 +219,8 @@ impl Layout {
                 let (from, to) = range(polygon, axis);
                 if to - from > MAX_REPEATS {
                     let why = format!(
-                        "the face repeats the texture {:.0} times; at most {MAX_REPEATS} are left \
-                         of it at 256 texels",
+                        "the face repeats the texture {:.0} times, and at most {MAX_REPEATS} fit \
+                         into 256 texels; cut the face or scale its texture coordinates",
                         to - from
                     );
                     return Err(BadLine {
@@ -187,6 +283,8 @@ impl Layout {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Cursor;
+
     use super::*;
     use crate::model::mesh::Polygons;
     use crate::model::obj;
@@ -213,6 +311,205 @@ mod tests {
     }
 
     const WHOLE: [[f64; 2]; 3] = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]];
+
+    /// A PNG of rows of bytes.
+    fn encoded(
+        (width, height): (u32, u32),
+        colour: ColorType,
+        depth: BitDepth,
+        rows: &[u8],
+        more: impl FnOnce(&mut png::Encoder<'_, &mut Vec<u8>>),
+    ) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(colour);
+        encoder.set_depth(depth);
+        more(&mut encoder);
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(rows).unwrap();
+        writer.finish().unwrap();
+        bytes
+    }
+
+    fn picture(bytes: &[u8]) -> (Vec<u8>, bool) {
+        let picture = read(Cursor::new(bytes)).unwrap();
+        (picture.pixels.into_raw(), picture.transparent)
+    }
+
+    #[test]
+    fn every_kind_of_png_is_read_right() {
+        let palette: &[u8] = &[10, 20, 30, 40, 50, 60, 70, 80, 90];
+        let grey = |values: &[u8]| values.iter().flat_map(|&v| [v; 3]).collect::<Vec<_>>();
+        use BitDepth::{Eight, Four, One, Sixteen, Two};
+        use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
+        let whole: &[(ColorType, BitDepth, &[u8], Vec<u8>)] = &[
+            (Grayscale, One, &[0b1010_0000], grey(&[255, 0, 255])),
+            (Grayscale, Two, &[0b0001_1100], grey(&[0, 85, 255])),
+            (Grayscale, Four, &[0x0f, 0x80], grey(&[0, 255, 136])),
+            (Grayscale, Eight, &[1, 2, 3], grey(&[1, 2, 3])),
+            (
+                Grayscale,
+                Sixteen,
+                &[1, 1, 2, 2, 255, 255],
+                grey(&[1, 2, 255]),
+            ),
+            (Rgb, Eight, &[1, 2, 3, 4, 5, 6, 7, 8, 9], (1..10).collect()),
+            (
+                Rgb,
+                Sixteen,
+                &[1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6, 7, 7, 8, 8, 9, 9],
+                (1..10).collect(),
+            ),
+            (
+                Indexed,
+                One,
+                &[0b0100_0000],
+                [&palette[..6], &palette[..3]].concat(),
+            ),
+            (Indexed, Two, &[0b0001_1000], palette.into()),
+            (Indexed, Four, &[0x01, 0x20], palette.into()),
+            (Indexed, Eight, &[0, 1, 2], palette.into()),
+            (
+                GrayscaleAlpha,
+                Eight,
+                &[1, 255, 2, 255, 3, 255],
+                grey(&[1, 2, 3]),
+            ),
+            (
+                Rgba,
+                Eight,
+                &[1, 2, 3, 255, 4, 5, 6, 255, 7, 8, 9, 255],
+                (1..10).collect(),
+            ),
+        ];
+        for (colour, depth, rows, pixels) in whole {
+            let bytes = encoded((3, 1), *colour, *depth, rows, |encoder| {
+                if *colour == Indexed {
+                    encoder.set_palette(palette);
+                }
+            });
+            assert_eq!(
+                picture(&bytes),
+                (pixels.clone(), false),
+                "{colour:?} {depth:?}"
+            );
+        }
+        // In seven passes: see `at`.
+        let interlaced: Vec<u8> = INTERLACED
+            .as_bytes()
+            .chunks(2)
+            .map(|pair| u8::from_str_radix(str::from_utf8(pair).unwrap(), 16).unwrap())
+            .collect();
+        let at = |x: u8, y: u8| [x * 32, y * 32, (x ^ y) * 16];
+        let all = (0..8).flat_map(|y| (0..8).map(move |x| at(x, y)));
+        let all: Vec<_> = all.flatten().collect();
+        assert_eq!(picture(&interlaced), (all, false));
+        // Animated: the first picture.
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
+        encoder.set_color(Rgb);
+        encoder.set_animated(2, 0).unwrap();
+        let mut writer = encoder.write_header().unwrap();
+        writer.write_image_data(&[1, 2, 3]).unwrap();
+        writer.write_image_data(&[7, 8, 9]).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(picture(&bytes), (vec![1, 2, 3], false));
+    }
+
+    #[test]
+    fn what_is_transparent_is_grey_and_what_hides_there_is_gone() {
+        use BitDepth::{Eight, Sixteen, Two};
+        use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
+        let [ground, ..] = GROUND;
+        // Half of 255 and half of the ground.
+        let half = ((255 * 128 + u32::from(ground) * 127 + 127) / 255) as u8;
+        let clear: &[u8] = &[ground; 3];
+        type Case<'a> = (ColorType, BitDepth, &'a [u8], &'a [u8], Vec<u8>);
+        let cases: &[Case] = &[
+            (
+                Rgba,
+                Eight,
+                &[],
+                &[255, 0, 255, 0, 255, 255, 255, 128, 1, 2, 3, 255],
+                [clear, &[half; 3], &[1, 2, 3]].concat(),
+            ),
+            (
+                Rgba,
+                Sixteen,
+                &[],
+                &[255, 255, 0, 0, 255, 255, 0, 0, 1, 1, 2, 2, 3, 3, 255, 255],
+                [clear, &[1, 2, 3]].concat(),
+            ),
+            (
+                GrayscaleAlpha,
+                Eight,
+                &[],
+                &[9, 0, 255, 128, 7, 255],
+                [clear, &[half; 3], &[7; 3]].concat(),
+            ),
+            // Keys. One of 16 bits is one colour, and not all with its upper halves.
+            (
+                Grayscale,
+                Two,
+                &[0, 1],
+                &[0b0110_0000],
+                [clear, &[170; 3], &[0; 3]].concat(),
+            ),
+            (
+                Rgb,
+                Eight,
+                &[0, 1, 0, 2, 0, 3],
+                &[1, 2, 3, 1, 2, 4],
+                [clear, &[1, 2, 4]].concat(),
+            ),
+            (
+                Rgb,
+                Sixteen,
+                &[1, 1, 2, 2, 3, 3],
+                &[1, 1, 2, 2, 3, 3, 1, 0, 2, 0, 3, 0],
+                [clear, &[1, 2, 3]].concat(),
+            ),
+            (
+                Indexed,
+                Eight,
+                &[0, 128],
+                &[0, 1, 2],
+                [clear, &[half; 3], &[7, 8, 9]].concat(),
+            ),
+        ];
+        for (colour, depth, trns, rows, pixels) in cases {
+            let size = (pixels.len() as u32 / 3, 1);
+            let bytes = encoded(size, *colour, *depth, rows, |encoder| {
+                if *colour == Indexed {
+                    encoder.set_palette(&[255, 0, 255, 255, 255, 255, 7, 8, 9][..]);
+                }
+                if !trns.is_empty() {
+                    encoder.set_trns(*trns);
+                }
+            });
+            assert_eq!(
+                picture(&bytes),
+                (pixels.clone(), true),
+                "{colour:?} {depth:?}"
+            );
+        }
+        // The scaler and the quantizer see one colour, whatever hid there.
+        let hidden: Vec<u8> = (0..300u32 * 300)
+            .flat_map(|i| [i as u8, (i >> 8) as u8, 255, 0])
+            .collect();
+        let bytes = encoded((300, 300), Rgba, Eight, &hidden, |_| {});
+        let (layout, _) = laid_out(&[WHOLE], (300, 300));
+        let texels = layout.cut_scaled(&read(Cursor::new(bytes)).unwrap().pixels);
+        assert!(texels.iter().all(|texel| texel.0 == GROUND));
+    }
+
+    /// 8 x 8 pixels, interlaced.
+    const INTERLACED: &str = "\
+         89504e470d0a1a0a0000000d49484452000000080000000808020000013c6a194a000000824944415478da0d\
+         4e51150040045b0411164104112ec22288208a28a288727cb0bdcd00ae0a712daa708003214a533cca885334\
+         37308a891ace008409de788b04c315d6911b0faca7ca2edbf20b4bcdebf11dbb25232fd245165f3386b91420\
+         a7183209a56c69f45677b21f3ba253ad6aebc6b46fdf639b3cc33e6dd47a2f676d171fd0f74601a696b4fa00\
+         00000049454e44ae426082";
 
     #[test]
     fn a_small_picture_stays_as_it_is_and_a_large_one_is_scaled_to_fit() {
