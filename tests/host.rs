@@ -5,6 +5,7 @@
 mod diff;
 mod fuzz;
 mod gaps;
+mod import;
 mod mutants;
 mod pictures;
 mod trade;

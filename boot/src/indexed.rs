@@ -66,9 +66,9 @@ impl Indexed {
         };
         let parts = info.palette.as_deref().context("it has no palette")?;
         let (colours, rest) = parts.as_chunks::<3>();
-        if !rest.is_empty() || colours.len() > 256 {
+        if !rest.is_empty() {
             bail!(
-                "its palette has {} bytes, not three for each of up to 256 colours",
+                "its palette has {} bytes, not three for each colour",
                 parts.len()
             );
         }

@@ -206,7 +206,15 @@ enum Subcommands {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli = Cli::try_parse().unwrap_or_else(|error| {
+        let obeyed = |word: OsString| word.to_string_lossy().contains(char::is_control);
+        if !std::env::args_os().any(obeyed) {
+            error.exit();
+        }
+        // The message may quote a word that a terminal obeys: print it without clap's colours.
+        say(&error);
+        std::process::exit(error.exit_code());
+    });
     // clap cannot require it of options that stand on different sides of a subcommand.
     let needs_model = match (&cli.model.texture, cli.look.scene) {
         (Some(_), _) => Some("--texture"),

@@ -138,7 +138,8 @@ impl Model {
             None => error,
         };
         // A page may hold the text of an OBJ.
-        if obj.trim_ascii_start().starts_with(b"<") {
+        let text = obj.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(obj);
+        if text.trim_ascii_start().starts_with(b"<") {
             return Err(other(anyhow!("it is no OBJ")));
         }
         let obj = obj::parse(obj).map_err(|error| other(error.into()))?;

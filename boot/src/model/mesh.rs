@@ -283,6 +283,8 @@ impl Polygons {
             ..Solid::default()
         };
         let mut ears = Ears::default();
+        // Faces, if cutting leaves out no triangle.
+        let mut triangles = 0;
         for polygon in &self.polygons {
             let places = layout.texels(polygon);
             let corners = polygon
@@ -307,7 +309,19 @@ impl Polygons {
                 });
             };
             let n = corners.len();
-            match first_of_whole(&polygon.ring, polygon.normal, &corners) {
+            let whole = first_of_whole(&polygon.ring, polygon.normal, &corners);
+            triangles += whole.map_or(n - 2, |_| 1);
+            // Before it is cut: a face that runs over the same points again and again takes seconds.
+            if triangles > MAX_FACES {
+                let why = format!(
+                    "with this face cut into triangles the model has more than {MAX_FACES} faces \
+                     (the file has {}); {SIMPLIFY}",
+                    self.polygons.len() + self.tally.degenerate,
+                );
+                let line = polygon.line;
+                return Err(BadLine { line, why }.into());
+            }
+            match whole {
                 Some(first) => add(&mut (0..n).map(|i| (first + i) % n)),
                 None => {
                     let triangles = ears.cut(&polygon.ring);
@@ -317,16 +331,12 @@ impl Polygons {
                         .for_each(|triangle| add(&mut triangle.iter().copied()));
                 }
             }
-            if solid.faces.len() > MAX_FACES || solid.corners.len() > MAX_ALL_CORNERS {
-                let why = format!(
-                    "with this face cut into triangles the model has more than {MAX_FACES} faces \
-                     or {MAX_ALL_CORNERS} corners (the file has {} faces); {SIMPLIFY}",
-                    self.polygons.len() + self.tally.degenerate,
-                );
-                let line = polygon.line;
-                return Err(BadLine { line, why }.into());
-            }
         }
+        ensure!(
+            solid.corners.len() <= MAX_ALL_CORNERS,
+            "its faces have {} corners, and a model has at most {MAX_ALL_CORNERS}; {SIMPLIFY}",
+            solid.corners.len()
+        );
         ensure!(
             !solid.faces.is_empty(),
             "none of its faces can be cut into triangles; {SIMPLIFY}"

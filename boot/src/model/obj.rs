@@ -89,18 +89,17 @@ pub struct LeftOut {
     /// How many.
     pub count: usize,
     /// The first keywords in the order of the file, the first line and the number of each.
-    pub kinds: Vec<(String, usize, usize)>,
+    pub kinds: Vec<(Vec<u8>, usize, usize)>,
 }
 
 impl LeftOut {
     fn add(&mut self, keyword: &[u8], line: usize) {
         self.count += 1;
-        let keyword = quoted(keyword);
-        let known = self.kinds.iter_mut().find(|(known, ..)| *known == keyword);
+        let known = self.kinds.iter_mut().find(|(known, ..)| known == keyword);
         if let Some((.., count)) = known {
             *count += 1;
         } else if self.kinds.len() < KINDS {
-            self.kinds.push((keyword, line, 1));
+            self.kinds.push((keyword.to_vec(), line, 1));
         }
     }
 }
@@ -116,7 +115,7 @@ impl fmt::Display for LeftOut {
         write!(f, " (")?;
         for (i, (keyword, _, count)) in self.kinds.iter().enumerate() {
             let comma = if i == 0 { "" } else { ", " };
-            write!(f, "{comma}{count} {keyword}")?;
+            write!(f, "{comma}{count} {}", quoted(keyword))?;
         }
         let named: usize = self.kinds.iter().map(|(.., count)| count).sum();
         match self.count - named {
@@ -171,8 +170,8 @@ pub fn parse(bytes: &[u8]) -> Result<Obj, BadLine> {
     let unknown = unknown.map(|(keyword, line, _)| BadLine {
         line: *line,
         why: format!(
-            "{keyword} is not a statement of a Wavefront OBJ, and the file has no faces; give an \
-             OBJ file"
+            "{} is not a statement of a Wavefront OBJ, and the file has no faces; give an OBJ file",
+            quoted(keyword)
         ),
     });
     match (wrong, unknown) {
@@ -223,18 +222,20 @@ fn faces(bytes: &[u8], obj: &mut Obj) -> Result<Each<usize>, BadLine> {
 /// Reads a face from its corners.
 fn face<'a>(
     line: usize,
-    words: impl Iterator<Item = &'a [u8]>,
+    mut words: impl Iterator<Item = &'a [u8]>,
     there: Each<usize>,
     obj: &mut Obj,
 ) -> Result<(), String> {
     let first = obj.corners.len();
-    for word in words {
+    for word in words.by_ref().take(MAX_CORNERS) {
         obj.corners.push(corner(word, there)?);
     }
     let corners = obj.corners.len() - first;
-    if corners > MAX_CORNERS {
+    let more = words.count();
+    if more > 0 {
         return Err(format!(
-            "the face has {corners} corners, and a face has at most {MAX_CORNERS}; {SIMPLIFY}"
+            "the face has {} corners, and a face has at most {MAX_CORNERS}; {SIMPLIFY}",
+            corners + more
         ));
     }
     if obj.faces.len() == MAX_READ || obj.corners.len() > MAX_READ_CORNERS {
@@ -654,7 +655,7 @@ mod tests {
         );
         let tagged = left_out("t crease 2/1/0 1 2 2.0");
         assert_eq!(tagged.to_string(), "1 statement left out (1 't')");
-        assert_eq!(tagged.kinds, [("'t'".into(), 8, 1)]);
+        assert_eq!(tagged.kinds, [(b"t".to_vec(), 8, 1)]);
         let many =
             left_out("vw 1\nt\nusemap a\nvw 2\ncstype b\ncurv 1\nsurf 1\nend\nend\n\x1b[0m\n");
         let words = "10 statements left out (2 'vw', 1 't', 1 'usemap', 1 'cstype', 1 'curv', \

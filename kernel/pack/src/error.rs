@@ -54,8 +54,15 @@ pub enum PackError {
     Colour(usize),
     /// This vertex is too far out.
     Vertex(usize),
-    /// This corner is at a vertex that there is not.
-    CornerVertex(usize),
+    /// A corner refers to a vertex that does not exist.
+    CornerVertex {
+        /// The corner.
+        corner: usize,
+        /// The vertex that it refers to.
+        vertex: u16,
+        /// Vertices that exist.
+        vertices: usize,
+    },
     /// This corner is outside of the texture.
     CornerPlace(usize),
     /// This face has too few or too many corners.
@@ -80,7 +87,7 @@ impl From<TextureError> for PackError {
 impl fmt::Display for PackError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoPack => f.write_str("it does not begin as a pack does"),
+            Self::NoPack => f.write_str("it does not begin as a pack"),
             Self::Short(len) => write!(f, "{len} bytes are too few for a pack"),
             Self::TooLong(len) => {
                 write!(f, "it has {len} bytes; a pack has at most {MAX_BYTES}")
@@ -106,8 +113,15 @@ impl fmt::Display for PackError {
             Self::Texture(error) => write!(f, "{error}"),
             Self::Colour(i) => write!(f, "colour {i} has a part above 63"),
             Self::Vertex(i) => write!(f, "vertex {i} is outside +-{MAX_EXTENT}"),
-            Self::CornerVertex(i) => write!(f, "corner {i} is at a vertex that there is not"),
-            Self::CornerPlace(i) => write!(f, "corner {i} is outside of the texture"),
+            Self::CornerVertex {
+                corner,
+                vertex,
+                vertices,
+            } => write!(
+                f,
+                "corner {corner} refers to vertex {vertex}, but the mesh has {vertices} vertices"
+            ),
+            Self::CornerPlace(i) => write!(f, "corner {i} is outside the texture"),
             Self::FaceCorners(i) => {
                 write!(
                     f,

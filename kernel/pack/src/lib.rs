@@ -281,7 +281,11 @@ impl<'p> Pack<'p> {
         let height = i32::from(self.texture.height()) << 16;
         for (i, corner) in self.corners.iter().map(corner).enumerate() {
             if usize::from(corner.vertex) >= self.vertices.len() {
-                return Err(PackError::CornerVertex(i));
+                return Err(PackError::CornerVertex {
+                    corner: i,
+                    vertex: corner.vertex,
+                    vertices: self.vertices.len(),
+                });
             }
             if !(0..=width).contains(&corner.u) || !(0..=height).contains(&corner.v) {
                 return Err(PackError::CornerPlace(i));
@@ -475,6 +479,7 @@ mod tests {
             (Vec::new(), "does not begin as a pack"),
             (MAGIC.to_vec(), "8 bytes are too few"),
             (put(8, &[2]), "of version 2; this program reads version 1"),
+            (std::vec![0; MAX_BYTES], "does not begin as a pack"),
             (std::vec![0; MAX_BYTES + 1], "has at most 524288"),
             (put(20, &[1, 16]), "4097 vertices; there is room for 4096"),
             (put(22, &[1, 96]), "24577 corners; there is room for 24576"),
@@ -495,27 +500,30 @@ mod tests {
             (put(HEADER + 5, &[64]), "colour 1 has a part above 63"),
             (put(VERTICES + 15, &[0x7F]), "vertex 1 is outside"),
             (put(VERTICES + 15, &[0x80]), "vertex 1 is outside"),
-            (put(CORNERS, &[24]), "corner 0 is at a vertex"),
+            (
+                put(CORNERS, &[24]),
+                "corner 0 refers to vertex 24, but the mesh has 24 vertices",
+            ),
             (
                 put(CORNERS + 15, &[0xFF]),
-                "corner 1 is outside of the texture",
+                "corner 1 is outside the texture",
             ),
-            (
-                put(CORNERS + 14, &[8]),
-                "corner 1 is outside of the texture",
-            ),
+            (put(CORNERS + 14, &[8]), "corner 1 is outside the texture"),
             (put(FACES, &[2]), "face 0 has fewer than 3"),
             (
                 put(FACES + 8, &[12]),
                 "face 1 has fewer than 3 or more than 11",
             ),
             (put(FACES + 2, &[0, 64]), "the normal of face 0"),
+            (put(FACES + 2, &[0, 64, 1, 1, 0, 0]), "the normal of face 0"),
             (put(FACES + 6, &[0, 0]), "the normal of face 0"),
             (put(FACES, &[5]), "its faces take 25 corners, and it has 24"),
         ] {
             let error = Pack::parse(&bytes).unwrap_err().to_string();
             assert!(error.contains(why), "{error}, and not {why}");
         }
+        // As far from a unit vector as rounding may take a normal: 2^28 + 2^16.
+        Pack::parse(&put(FACES + 2, &[0, 64, 0, 1, 0, 0])).unwrap();
         let mut long = cube();
         long.push(0);
         let error = Pack::parse(&long).unwrap_err().to_string();
