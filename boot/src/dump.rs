@@ -463,7 +463,7 @@ mod tests {
         for (at, line, why) in [
             (0, "crystal-ball dump 2", "reads versions 3 to 4"),
             (0, "crystal-ball dump 5", "reads versions 3 to 4"),
-            (0, "crystal-ball dump four", "version four"),
+            (0, "crystal-ball dump four", "version 'four'"),
             (6, "motion 1 2 3", "it has four hex numbers"),
             (6, "motion 1 2 3 -4", "it has four hex numbers"),
         ] {

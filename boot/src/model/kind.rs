@@ -117,7 +117,7 @@ mod tests {
             (b"Kaydara FBX Binary  \0\x1a\0", "FBX"),
             (b"; FBX 7.4.0 project file", "FBX"),
             (b"PK\x03\x04\x14\0", "ZIP"),
-            (b"\x1f\x8b\x08\0", "GZIP"),
+            (b"\x1f\x8b\x08\0", "GZ"),
             (b"%PDF-1.7", "PDF"),
             (b"\x7fELF\x02\x01\x01", "ELF"),
             (b"newmtl red\nKd 1 0 0\n", "an MTL material library"),
