@@ -23,8 +23,6 @@ use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use scene::{MAX_EXTENT, Mesh, Pose, Stage, Storage};
 use texmap::{Mapper, Texture};
 
-/// The seed of the tests that are always run.
-const SEED: u64 = 6;
 /// Where a pack's counts begin, after magic, version, length and checksum.
 const COUNTS: usize = 20;
 
@@ -150,7 +148,7 @@ fn run(
 ) -> (u64, u64) {
     let (mut cases, mut accepted) = (0, 0);
     while more(cases) {
-        let guard = Case(first + cases);
+        let guard = Case(first.wrapping_add(cases));
         accepted += u64::from(case(&mut Rng::with_seed(guard.0)));
         cases += 1;
     }
@@ -526,8 +524,10 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
             "{kind}: {cases} cases from seed {seed}, {accepted} of them accepted, {:.1} s",
             begun.elapsed().as_secs_f64()
         );
-        // Fewer, and nothing behind the first checks was reached; more, and nothing was wrong.
-        assert!(accepted * 100 > cases && accepted < cases, "{kind}");
+        // Fewer, and nothing behind the first checks was reached; more, and nothing was wrong. Of
+        // each kind a twentieth at least is accepted: a few cases may be all of one sort.
+        let some = accepted * 100 > cases && accepted < cases;
+        assert!(some || cases < 1000, "{kind}");
     };
     tell("packs", &mut |random| pack_case(&packs, &mut room, random));
     tell("OBJs", &mut |random| obj_case(&objs, &mut room, random));
@@ -537,7 +537,8 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
 
 #[test]
 fn nothing_in_any_state_panics() {
-    all(SEED, |_, cases| cases < 2000);
+    let (seed, most) = (seeded::generator().get_seed(), seeded::cases(2000) as u64);
+    all(seed, |_, cases| cases < most);
 }
 
 #[test]
