@@ -12,14 +12,15 @@ use std::sync::LazyLock;
 use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::diff::Subject;
 use crystal_ball::golden::{self, Findings, Golden, Transfer};
-use crystal_ball::machine::Machine;
+use crystal_ball::machine::{Config, Machine};
+use crystal_ball::setup::Ready;
 use emulator::Access;
 use link::{Command, Content, Picture};
 use tempfile::TempDir;
 
 use crate::ready::{READY, config};
 
-fn goldens() -> Vec<Golden> {
+pub fn goldens() -> Vec<Golden> {
     golden::find(&golden::folder()).expect("the golden frames")
 }
 
@@ -137,17 +138,20 @@ fn goldens_sent_byte_by_byte_are_of_every_kind() {
     assert_eq!(of_kind, [""; 0], "no golden of such a scene is sent");
 }
 
+/// Goldens for a quick look at a configuration.
+pub fn few() -> Vec<Golden> {
+    let names = ["erased-turn", "nearest", "speck"];
+    let mut few = goldens();
+    few.retain(|golden| names.contains(&golden.name.as_str()));
+    assert_eq!(few.len(), names.len());
+    few
+}
+
 /// The adapters with a VGA core, another chipset, and the card's own retrace: QEMU's plain one
 /// flickers at every read.
 #[test]
 fn a_few_configurations_agree() {
-    let few = goldens();
-    let names = ["erased-turn", "nearest", "speck"];
-    let few = few
-        .iter()
-        .filter(|golden| names.contains(&golden.name.as_str()));
-    let few: Vec<_> = few.cloned().collect();
-    assert_eq!(few.len(), names.len());
+    let few = few();
     for (vga, arguments) in [
         ("cirrus", ""),
         ("vmware", ""),
@@ -155,49 +159,48 @@ fn a_few_configurations_agree() {
         ("std", "-machine q35 -smp 2"),
         ("std,retrace=precise", ""),
     ] {
-        agrees(&few, vga, arguments);
+        agrees(&few, &with_arguments(&READY, vga, arguments)).unwrap();
+    }
+}
+
+/// A configuration.
+pub fn with_arguments(ready: &Ready, vga: &str, arguments: &str) -> Config {
+    Config {
+        vga: vga.into(),
+        arguments: arguments.split_whitespace().map(Into::into).collect(),
+        ..Config::new(ready)
     }
 }
 
 /// Boots a configuration and checks goldens by checksum and screen.
-#[track_caller]
-fn agrees(goldens: &[Golden], vga: &str, arguments: &str) {
-    let what = format!("-vga {vga} {arguments}");
-    let mut config = config();
-    config.vga = vga.into();
-    config.arguments = arguments.split_whitespace().map(Into::into).collect();
-    let mut machine = Machine::boot(&config).unwrap_or_else(|error| panic!("{what}: {error}"));
+///
+/// # Errors
+/// A boot that fails, and the first goldens that differ.
+pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
+    let mut machine = Machine::boot(config)?;
     let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut emulated = Emulated::new(&mut memory)?;
     let mut findings = Findings::default();
     for golden in goldens {
-        findings
-            .check_cards(golden, &mut emulated, &mut machine, Transfer::Checksums)
-            .unwrap_or_else(|error| panic!("{what}: {error:#}"));
+        findings.check_cards(golden, &mut emulated, &mut machine, Transfer::Checksums)?;
     }
-    machine.leave().expect(&what);
-    if let Err(wrong) = findings.verdict(&report("configuration")) {
-        panic!("{what}: {wrong:#}");
-    }
+    machine.leave()?;
+    findings.verdict(&report("configuration"))
 }
 
 /// What is asked of a boot to be the same as of every other: all of video memory after three
 /// pictures, and what drawing them took.
-fn evidence(arguments: &str) -> Vec<String> {
-    let mut config = config();
-    config.arguments = arguments.split_whitespace().map(Into::into).collect();
-    let mut machine = Machine::boot(&config).unwrap();
-    machine
-        .show(&[0, 480, u32::MAX].map(Picture::Frame))
-        .unwrap();
-    let mut evidence = machine.ask(Command::Checksums(Content::Memory)).unwrap();
-    evidence.extend(machine.ask(Command::Counts).unwrap());
-    machine.leave().unwrap();
-    evidence
+pub fn evidence(config: &Config) -> anyhow::Result<Vec<String>> {
+    let mut machine = Machine::boot(config)?;
+    machine.show(&[0, 480, u32::MAX].map(Picture::Frame))?;
+    let mut evidence = machine.ask(Command::Checksums(Content::Memory))?;
+    evidence.extend(machine.ask(Command::Counts)?);
+    machine.leave()?;
+    Ok(evidence)
 }
 
 /// What the emulated card says to the same.
-fn emulated_evidence() -> Vec<String> {
+pub fn emulated_evidence() -> Vec<String> {
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     emulated
@@ -210,64 +213,8 @@ fn emulated_evidence() -> Vec<String> {
 
 #[test]
 fn counted_instructions_change_no_byte() {
-    assert_eq!(evidence("-icount shift=0"), emulated_evidence());
-}
-
-/// The wide set, by `cargo wide`: each configuration with every golden, a hundred boots, eight at
-/// once.
-#[test]
-#[ignore = "takes about four minutes; run it by `cargo wide`"]
-fn wide_set() {
-    LazyLock::force(&READY);
-    let goldens = goldens();
-    let expected = emulated_evidence();
-    let configurations = [
-        ("std", ""),
-        ("cirrus", ""),
-        ("vmware", ""),
-        ("virtio", ""),
-        ("std,retrace=precise", ""),
-        ("std", "-machine q35"),
-        ("cirrus", "-machine q35"),
-        ("virtio", "-machine q35"),
-        ("std", "-m 32"),
-        ("std", "-m 64"),
-        ("std", "-m 1024"),
-        ("std", "-m 3072"),
-        ("std", "-cpu qemu64"),
-        ("std", "-cpu max"),
-        ("std", "-cpu Nehalem"),
-        ("std", "-smp 4"),
-        ("std", "-icount shift=0"),
-    ];
-    // As on a PC without virtio, a disk that is read through ports.
-    let ide = format!(
-        "-drive if=none,id=ide,format=raw,snapshot=on,file={} -device ide-hd,drive=ide,bootindex=0",
-        READY.image.display()
-    );
-    let configurations = configurations.iter().copied();
-    let configurations: Vec<_> = configurations.chain([("std", ide.as_str())]).collect();
-    for (vga, arguments) in &configurations {
-        eprintln!("-vga {vga} {arguments}");
-        agrees(&goldens, vga, arguments);
-    }
-    for boot in 1..=100 {
-        assert_eq!(evidence(""), expected, "boot {boot}");
-        if boot % 10 == 0 {
-            eprintln!("{boot} boots");
-        }
-    }
-    let together: Vec<_> = (0..8)
-        .map(|_| std::thread::spawn(|| evidence("")))
-        .collect();
-    for boot in together {
-        assert_eq!(boot.join().unwrap(), expected);
-    }
-    eprintln!(
-        "{} configurations with {} goldens each, 100 boots one by one, 8 at once: all equal",
-        configurations.len(),
-        goldens.len()
-    );
+    let counting = with_arguments(&READY, "std", "-icount shift=0");
+    assert_eq!(evidence(&counting).unwrap(), emulated_evidence());
 }
 
 /// A folder with copies of two goldens.

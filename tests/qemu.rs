@@ -12,3 +12,4 @@ mod measure;
 mod model;
 mod ready;
 mod record;
+mod wide;
