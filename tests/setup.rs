@@ -7,8 +7,8 @@
 //! `cargo test --test setup -- --ignored real`.
 
 use std::env;
-use std::fs::{self, File};
-use std::io::{Read, Write};
+use std::fs;
+use std::io::Write;
 use std::os::unix::fs::symlink;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -18,16 +18,15 @@ use std::time::{Duration, Instant};
 
 use crystal_ball::child::{self, Interrupted};
 use crystal_ball::setup::{self, Options};
-use rustix::fs::{Mode, OFlags};
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use tempfile::TempDir;
 
 /// Names what the process of [`in_a_world`] shall do.
 const DO: &str = "CRYSTAL_BALL_TEST_DO";
 
 /// What the scripts may call, beside each other.
-const TOOLS: [&str; 12] = [
+const TOOLS: [&str; 13] = [
     "sh", "setpriv", "mkdir", "cp", "cat", "sleep", "chmod", "mv", "rm", "date", "touch", "ln",
+    "env",
 ];
 
 /// Writes a complete toolchain, slowly, and with its end last.
@@ -51,8 +50,8 @@ toolchain $RUSTUP_HOME/toolchains/1.96.0-x86_64-unknown-linux-gnu
 
 /// Builds whatever is asked for, slowly.
 const CARGO: &str = r#"
-case $PWD in
-*/boot/image)
+case $* in
+*/boot/image/*)
     while [ $1 != --target-dir ]; do shift; done
     echo "   Compiling bootloader" >&2
     mkdir -p $2/debug; sleep 0.03
@@ -103,7 +102,7 @@ impl World {
             folder: tempfile::tempdir().unwrap(),
             real,
         };
-        for folder in ["home", "cache", "target"] {
+        for folder in ["home", "cache", "target", "tmp"] {
             fs::create_dir(world.path(folder)).unwrap();
         }
         fs::write(world.path("target/.rustc_info.json"), "").unwrap();
@@ -127,6 +126,42 @@ impl World {
         write_program(&self.path("bin").join(name), script);
     }
 
+    /// An archive with a QEMU, and a system that has one of the libraries that QEMU needs.
+    fn debian_with_qemu(&self) {
+        let apt = r#"
+echo "$*" >>$HOME/apt.log
+# The hash of "hello\n".
+hash=SHA256:5891b5b522d5df086d0ff0b110fbd9d21bb4fc7163af34d08286a2e846f6be03
+offer() { echo "'http://archive/$1.deb' ${1}_1_amd64.deb 6 $2"; }
+all=$*
+case " $all" in
+*" update") echo "'http://archive/debian/dists/bookworm/InRelease' x 0" ;;
+*" install "*)
+    for name in libsame qemu-data ${all##* install }; do offer $name MD5Sum:00; done ;;
+*--print-uris*) for name in ${all##* download }; do offer $name $hash; done ;;
+*) for name in ${all##* download }; do echo hello >${name}_1_amd64.deb; done ;;
+esac"#;
+        let dpkg = r#"
+mkdir -p $3/usr/bin $3/usr/lib/x86_64-linux-gnu $3/lib/x86_64-linux-gnu
+touch $3/lib/x86_64-linux-gnu/libx.so.1
+case $2 in
+*gui*) touch $3/usr/bin/window ;;
+*x86*) cat >$3/usr/bin/qemu-system-x86_64 <<'END'
+#!/bin/sh
+[ -e $LD_LIBRARY_PATH/libx.so.1 ] || exit 127
+case $1$3$5$7 in
+-L-L-L--version) echo "QEMU emulator version 10.0.2 (fake)" ;;
+-L-L-L-display) echo types:; [ -e ${0%/*}/window ] && echo gtk; echo none ;;
+*) exit 1 ;;
+esac
+END
+    chmod +x $3/usr/bin/qemu-system-x86_64 ;;
+esac"#;
+        self.program("apt-get", apt);
+        self.program("dpkg", dpkg);
+        self.program("dpkg-query", "echo 'installed libsame_1_amd64'");
+    }
+
     fn remove(&self, program: &str) {
         fs::remove_file(self.path("bin").join(program)).unwrap();
     }
@@ -140,6 +175,7 @@ impl World {
             // Not below the user's home, where cargo's settings may be.
             command.current_dir(self.path("home"));
             command
+                .env("TMPDIR", self.path("tmp"))
                 .env("PATH", self.path("bin"))
                 .env("CARGO", self.path("bin/cargo"));
         }
@@ -170,8 +206,8 @@ impl World {
         assert_eq!(entries(&self.cache("aside")), 0, "something is left aside");
         assert_eq!(
             entries(&self.cache("")),
-            4,
-            "lock, aside, toolchain, image maker"
+            5,
+            "lock, aside, toolchain, image maker, cargo's home"
         );
     }
 }
@@ -256,6 +292,8 @@ fn in_a_world() {
     };
     let done = match what.as_str() {
         "image" => setup::image(&options).map(|_| true),
+        "qemu" | "window" => setup::qemu(&options).map(|qemu| !qemu.version.is_empty()),
+        "suite" => setup::qemu_of_suite(&env::var("TEST_SUITE").unwrap()).map(|_| true),
         "doctor" => setup::doctor(&options, &mut std::io::stderr()),
         "clean" => setup::clean(&mut std::io::stderr()).map(|_| true),
         _ => setup::ready(&options).map(|ready| !ready.qemu.version.is_empty()),
@@ -419,9 +457,12 @@ fn no_way_to_a_compiler_is_one_message() {
         "- Debian's packages: this is no Debian system",
         "rustup toolchain install 1.96.0",
         "--toolchain DIR",
-        "on no other system",
     ];
     world.does("image").badly(&words);
+    world.remove("rustup");
+    world
+        .does("image")
+        .badly(&["install rustup (https://rustup.rs; it needs no administrator), then rustup"]);
     assert_eq!(entries(&world.cache("aside")), 0);
 }
 
@@ -502,11 +543,12 @@ fn debian(answers: &str) -> World {
     let world = World::new();
     world.remove("rustup");
     world.program("dpkg", "exit 1");
+    world.program("dpkg-query", "exit 0");
     let script = format!(
         r#"
 echo "$*" >>$HOME/apt.log
 offers() {{ # VERSION HASH: an archive that has these
-    for word; do case $word in -*|*=*|download|$1|$2) ;;
+    for word; do case $word in -*|*=*|*/*|download|install|$1|$2) ;;
     *rust*) echo "'http://archive/$word.deb' ${{word}}_$1_all.deb 5 SHA256:$2" ;;
     *) echo "'http://archive/$word.deb' ${{word}}_22_all.deb 5 SHA256:$2" ;;
     esac; done
@@ -566,14 +608,15 @@ fn debian_packages_make_the_toolchain_and_are_kept() {
     let unpack = r#"
 mkdir -p $3/usr/bin $3/usr/lib/x86_64-linux-gnu $3/usr/lib/llvm-22/bin $3/usr/lib/rustlib/src/rust/library/core/src
 touch $3/usr/lib/rustlib/src/rust/library/core/src/lib.rs
-cd $3/usr/lib/llvm-22/bin; touch llvm-objcopy llvm-objdump lld
+cd $3/usr/lib/llvm-22/bin
+for tool in llvm-objcopy llvm-objdump lld; do echo '#!/bin/sh' >$tool; chmod +x $tool; done
 printf '#!/bin/sh\n[ -d $LD_LIBRARY_PATH/../rustlib ] || exit 1
 echo "host: x86_64-unknown-linux-gnu"; echo "release: 1.96.0"' >$3/usr/bin/rustc; chmod +x $3/usr/bin/rustc"#;
     world.program("dpkg", unpack);
     world
         .does("image")
         .well()
-        .saying(&["downloading Rust 1.96.0 as Debian packages"]);
+        .saying(&["downloading Rust 1.96.0 as 7 Debian packages"]);
     let apt = || fs::read_to_string(world.path("home/apt.log")).unwrap();
     let asked = apt();
     assert!(!asked.contains("update"), "the system's lists do:\n{asked}");
@@ -620,67 +663,162 @@ fn failing_download_keeps_what_is_whole() {
     assert_eq!(entries(&world.cache("aside")), 0);
 }
 
+/// The real cargo says which settings it finds where the nested builds run, and where `cargo install` looks for
+/// them: in its home and above.
 #[test]
-fn missing_qemu_is_installed_in_the_open_or_asked_for() {
+fn users_cargo_settings_do_not_reach_the_builds() {
+    const HOSTILE: &str = r#"
+        [build]
+        rustflags = ["-C", "target-cpu=native"]
+        target = "x86_64-unknown-linux-gnu"
+        rustc-wrapper = "/nowhere/wrapper"
+        target-dir = "/nowhere/target"
+        [target.x86_64-unknown-none]
+        rustflags = ["-C", "link-arg=-fuse-ld=mold"]
+        [target.'cfg(all())']
+        rustflags = ["-C", "opt-level=0"]
+        [profile.release]
+        debug = true
+        [unstable]
+        build-std = ["std"]
+        [env]
+        RUSTC_LINKER = "mold"
+        [net]
+        retry = 7
+    "#;
+    let world = World::new();
+    let cargo = format!(
+        r#"
+config() {{ {} -Zunstable-options config get; }}
+{{ config; env; }} >>$HOME/settings.log
+case $* in */boot/image/*) (cd $CARGO_HOME/registry; config) >>$HOME/settings.log ;; esac
+{CARGO}"#,
+        env!("CARGO")
+    );
+    world.program("cargo", &cargo);
+    // Above the clone, which is the current folder, and above the cache; and in cargo's home.
+    for folder in [".cargo", "home/.cargo"] {
+        fs::create_dir(world.path(folder)).unwrap();
+        fs::write(world.path(folder).join("config.toml"), HOSTILE).unwrap();
+    }
+    let hostile = [
+        ("CARGO_BUILD_RUSTFLAGS", "-C target-cpu=native"),
+        ("CARGO_BUILD_TARGET", "x86_64-unknown-linux-gnu"),
+        ("CARGO_ENCODED_RUSTFLAGS", "-Ctarget-cpu=native"),
+        ("CARGO_PROFILE_RELEASE_LTO", "off"),
+        ("CARGO_TARGET_DIR", "/nowhere/target"),
+        ("CARGO_TARGET_X86_64_UNKNOWN_NONE_LINKER", "mold"),
+        ("CARGO_UNSTABLE_BUILD_STD", "std"),
+        ("RUSTFLAGS", "-C target-cpu=native"),
+        ("RUSTC_WRAPPER", "/nowhere/wrapper"),
+        ("CARGO_HTTP_TIMEOUT", "5"),
+    ];
+    let mut run = world.command("image");
+    Said::from(run.envs(hostile).output().unwrap()).well();
+    world.is_whole();
+    let log = fs::read_to_string(world.path("home/settings.log")).unwrap();
+    for word in [
+        "native",
+        "linux-gnu\"",
+        "nowhere",
+        "mold",
+        "opt-level",
+        "debug",
+        "std",
+        "LTO",
+    ] {
+        assert!(!log.contains(word), "{word} in:\n{log}");
+    }
+    // The network's settings stay: in the two builds and in one home.
+    assert_eq!(log.matches("net.retry = 7").count(), 3, "{log}");
+    assert_eq!(log.matches("\nCARGO_HTTP_TIMEOUT=5").count(), 2, "{log}");
+}
+
+#[test]
+fn missing_qemu_is_unpacked_into_the_cache() {
     let world = World::new();
     world.remove("qemu-system-x86_64");
+    world.does("qemu").badly(&[
+        "QEMU is needed",
+        "this is no Debian system",
+        "ask your administrator",
+        "sudo apt-get install qemu-system-x86",
+        "--qemu PATH",
+    ]);
     world
-        .does("ready")
-        .badly(&["package manager", "--qemu PATH"]);
-    let apt = format!(
-        "echo \"$*\" >>$HOME/apt.log\ncase \"$*\" in *install*) cat >${{0%/*}}/qemu-system-x86_64 <<'END'\n#!/bin/sh\n{QEMU}\nEND\nchmod +x ${{0%/*}}/qemu-system-x86_64 ;; esac"
-    );
-    world.program("apt-get", &apt);
-    let said = world.does("ready");
-    let root = Command::new("id").arg("-u").output().unwrap().stdout == b"0\n";
-    if root {
-        said.well()
-            .saying(&["installing Debian's package qemu-system-x86 on this system"]);
-        world.program("apt-get", "echo 'E: broken' >&2; exit 100");
-        world.remove("qemu-system-x86_64");
-        world.does("ready").badly(&[
-            "E: broken",
-            "apt-get install --no-install-recommends qemu-system-x86",
-        ]);
-    } else {
-        said.badly(&[
-            "sudo apt-get update && sudo apt-get install --no-install-recommends qemu-system-x86",
-        ]);
-        assert!(!world.path("home/apt.log").exists());
+        .does("doctor")
+        .badly(&["MISSING QEMU", "package manager"]);
+    world.debian_with_qemu();
+    world
+        .does("doctor")
+        .badly(&["the next run unpacks Debian's package qemu-system-x86"]);
+    world.does("qemu").well().saying(&[
+        "downloading QEMU as 2 Debian packages (12 B), once",
+        "unpacking QEMU",
+        "QEMU is in ",
+    ]);
+    assert_eq!(world.does("qemu").well().text, "", "a kept one is used");
+    let asked = || fs::read_to_string(world.path("home/apt.log")).unwrap();
+    let downloaded = |line: &&str| line.contains(" download ") && line.contains("libsame");
+    assert_eq!(asked().lines().find(downloaded), None, "the system has it");
+    // It is planned and downloaded, and nothing is installed.
+    let installs = |line: &&str| line.contains(" install ") && !line.contains("--print-uris");
+    assert_eq!(asked().lines().find(installs), None);
+
+    // It no longer starts: a library of the system is gone. It is unpacked again.
+    write_program(&world.cache("qemu/usr/bin/qemu-system-x86_64"), "exit 127");
+    world
+        .does("qemu")
+        .well()
+        .saying(&["the kept QEMU is not used", "unpacking QEMU"]);
+    // Without the network one that is kept will do.
+    let offline = |what| {
+        let mut command = world.command(what);
+        Said::from(command.env("CARGO_NET_OFFLINE", "1").output().unwrap())
+    };
+    offline("qemu").well();
+    offline("window")
+        .well()
+        .saying(&["cannot open a window", "offline"]);
+    // One with a window takes the place of the other.
+    world
+        .does("window")
+        .well()
+        .saying(&["downloading QEMU and its window"]);
+    assert_eq!(world.does("window").well().text, "");
+    assert_eq!(entries(&world.cache("")), 3, "lock, aside, QEMU");
+    assert_eq!(entries(&world.cache("aside")), 0);
+}
+
+#[test]
+fn qemu_of_a_suite_is_beside_the_systems() {
+    let world = World::new();
+    world.debian_with_qemu();
+    let of = |suite: &str| {
+        let mut command = world.command("suite");
+        Said::from(command.env("TEST_SUITE", suite).output().unwrap())
+    };
+    of("sid").well().saying(&["unpacking QEMU", "qemu-sid"]);
+    assert_eq!(of("sid").well().text, "");
+    let asked = fs::read_to_string(world.path("home/apt.log")).unwrap();
+    assert!(asked.contains("-t sid"), "{asked}");
+    for other in ["", "../x", "-o", "a b"] {
+        of(other).badly(&["is not the name of a Debian suite"]);
     }
 }
 
 #[test]
-fn question_is_ended_by_the_first_interrupt() {
-    let world = World::new();
-    world.remove("qemu-system-x86_64");
-    for program in ["apt-get", "sudo"] {
-        world.program(program, "exit 1");
-    }
-    let user = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC).unwrap();
-    grantpt(&user).unwrap();
-    unlockpt(&user).unwrap();
-    let terminal = ptsname(&user, Vec::new()).unwrap();
-    let flags = OFlags::RDWR | OFlags::NOCTTY | OFlags::CLOEXEC;
-    let terminal = rustix::fs::open(terminal, flags, Mode::empty()).unwrap();
-    let mut child = world
-        .command("ready")
-        .stdin(terminal.try_clone().unwrap())
-        .stderr(terminal)
-        .spawn()
-        .unwrap();
-    let mut user = File::from(user);
-    let mut text = Vec::new();
-    while !text.ends_with(b"[y/N]\r\n") {
-        let mut byte = [0];
-        user.read_exact(&mut byte).unwrap();
-        text.extend(byte);
-    }
-    // By now it waits for the answer, or will within a moment: either must do.
-    signal(&child, "INT");
-    wait_for(|| child.try_wait().unwrap().is_some());
-    let ended = child.wait().unwrap();
-    assert_eq!(ended.code(), Some(Interrupted::EXIT_CODE));
+fn full_disk_ends_the_search_for_a_compiler() {
+    let world = debian("exit 1");
+    world.program(
+        "rustup",
+        "echo 'error: could not write: No space left on device (os error 28)' >&2; exit 1",
+    );
+    world
+        .does("image")
+        .badly(&["No space left on device"])
+        .not_saying("Debian");
+    assert!(!world.path("home/apt.log").exists());
 }
 
 #[test]
@@ -690,7 +828,7 @@ fn being_without_a_window_is_no_error() {
     world
         .does("window")
         .well()
-        .saying(&["cannot open a window", "qemu-system-gui"]);
+        .saying(&["cannot open a window", "install qemu-system-gui"]);
     world.does("ready").well().not_saying("window");
 }
 

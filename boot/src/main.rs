@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::diff;
 use crystal_ball::frames::Frames;
@@ -28,8 +28,8 @@ const WARM_UP: Duration = Duration::from_secs(1);
 /// Boots Crystal Ball: a textured ball that turns in VGA Mode X, on a machine without an
 /// operating system.
 ///
-/// On first use it fetches a compiler into your cache folder and, where that is allowed, installs
-/// QEMU; it says what it does. In the window the key H tells the keys that steer it; close it or
+/// On first use it fetches a compiler and, where it is missing, QEMU into your cache folder, and says
+/// so. It installs nothing on the system. In the window the key H tells the keys that steer it; close it or
 /// type Ctrl-C to end it. Without a display it boots all the same and leaves a picture.
 #[derive(Debug, Parser)]
 #[command(version, after_help = AFTER_HELP)]
@@ -73,6 +73,11 @@ const DOCTOR_HELP: &str = "\
 Examples:
   cargo run -- doctor                                       what `cargo run` would find here
   cargo run -- doctor --qemu /opt/bin/qemu-system-x86_64    whether this QEMU would do";
+
+const QEMU_HELP: &str = "\
+Examples:
+  cargo run -- qemu                               the QEMU that a run uses
+  cargo run -- qemu --suite bookworm-backports    another version, to test with";
 
 const CLEAN_HELP: &str = "\
 Examples:
@@ -143,7 +148,7 @@ struct Boot {
 
 #[derive(Debug, Args)]
 struct Tools {
-    /// QEMU's program [default: qemu-system-x86_64 in PATH]
+    /// QEMU's program [default: qemu-system-x86_64 in PATH, else the cache folder's]
     #[arg(long, global = true, value_name = "PATH")]
     qemu: Option<PathBuf>,
     /// A complete Rust toolchain with library sources, llvm-tools and rust-lld, in place of the
@@ -157,6 +162,13 @@ enum Subcommands {
     /// Tell what is set up, where, and what is missing; install nothing
     #[command(after_help = DOCTOR_HELP)]
     Doctor,
+    /// Print the path of the QEMU that a run uses, and get one first where there is none
+    #[command(after_help = QEMU_HELP)]
+    Qemu {
+        /// Use this Debian suite's QEMU, and unpack it into the cache folder where it is not there
+        #[arg(long)]
+        suite: Option<String>,
+    },
     /// Remove what the set-up keeps, and say how much that was
     #[command(after_help = CLEAN_HELP)]
     Clean,
@@ -205,8 +217,42 @@ enum Subcommands {
     },
 }
 
+/// The command line. Options that every subcommand accepts are listed only in the help of those that use them.
+fn command() -> clap::Command {
+    const LOOK: [&str; 3] = ["scene", "mapper", "order"];
+    const MODEL: [&str; 2] = ["model", "texture"];
+    const TOOLS: [&str; 2] = ["qemu", "toolchain"];
+    let unused: [(&str, &[&[&str]]); 8] = [
+        ("clean", &[&LOOK, &MODEL, &TOOLS]),
+        ("replay", &[&LOOK, &MODEL, &TOOLS]),
+        ("diff", &[&LOOK, &MODEL, &TOOLS]),
+        ("doctor", &[&LOOK, &MODEL]),
+        ("qemu", &[&LOOK, &MODEL]),
+        ("bless", &[&LOOK, &MODEL]),
+        ("image", &[&LOOK]),
+        ("trade", &[&LOOK]),
+    ];
+    unused
+        .into_iter()
+        .fold(Cli::command(), |command, (name, ids)| {
+            let hidden: Vec<_> = ids
+                .concat()
+                .into_iter()
+                .filter_map(|id| {
+                    command
+                        .get_arguments()
+                        .find(|argument| argument.get_id() == id)
+                })
+                .map(|argument| argument.clone().hide(true))
+                .collect();
+            command.mut_subcommand(name, |subcommand| subcommand.args(hidden))
+        })
+}
+
 fn main() -> ExitCode {
-    let cli = Cli::try_parse().unwrap_or_else(|error| {
+    let parsed = command().try_get_matches();
+    let parsed = parsed.and_then(|matches| Cli::from_arg_matches(&matches));
+    let cli = parsed.unwrap_or_else(|error| {
         let obeyed = |word: OsString| word.to_string_lossy().contains(char::is_control);
         if !std::env::args_os().any(obeyed) {
             error.exit();
@@ -306,6 +352,16 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
             } else {
                 ExitCode::FAILURE
             });
+        }
+        Some(Subcommands::Qemu { suite }) => {
+            let qemu = match suite {
+                Some(suite) => setup::qemu_of_suite(&suite)?,
+                None => {
+                    options.window = has_display();
+                    setup::qemu(&options)?
+                }
+            };
+            tell_path(&qemu.path)?;
         }
         Some(Subcommands::Clean) => {
             setup::clean(&mut Output)?;
@@ -531,6 +587,30 @@ fn write_image(image: &Path, out: &Path) -> anyhow::Result<()> {
 mod tests {
     use super::*;
 
+    #[test]
+    fn help_lists_what_is_used_and_its_defaults() {
+        let whole = command();
+        let help = |name: &str| {
+            let mut of = whole.clone();
+            of.build();
+            let of = of.find_subcommand_mut(name).unwrap();
+            of.render_long_help().to_string()
+        };
+        for name in ["clean", "diff", "doctor"] {
+            for option in ["--mapper", "--scene", "--order", "--model"] {
+                assert!(!help(name).contains(option), "{name} {option}");
+            }
+        }
+        let mapper = texmap::Mapper::default().to_string();
+        for default in ["ball", mapper.as_str(), "polygons"] {
+            let shown = format!("[default: {default}]");
+            assert!(help("dump").contains(&shown), "{shown}");
+        }
+        // Hidden, and still accepted.
+        let words = ["crystal-ball", "clean", "--mapper", "exact"];
+        assert!(command().try_get_matches_from(words).is_ok());
+    }
+
     /// The commands of the examples in a help text.
     fn examples(help: &str) -> impl Iterator<Item = &str> {
         let (_, examples) = help.split_once("\nExamples").unwrap_or_default();
@@ -545,7 +625,7 @@ mod tests {
 
     #[test]
     fn every_help_has_examples_that_are_taken() {
-        let whole = Cli::command();
+        let whole = command();
         for of in [&whole].into_iter().chain(whole.get_subcommands()) {
             let name = of.get_name();
             let help = of.clone().render_long_help().to_string();
@@ -554,7 +634,7 @@ mod tests {
                 let arguments = example.split_once(" -- ").map_or("", |(_, after)| after);
                 let words = ["crystal-ball"].into_iter();
                 let words = words.chain(arguments.split_whitespace());
-                let taken = Cli::command().try_get_matches_from(words);
+                let taken = command().try_get_matches_from(words);
                 let taken = taken.unwrap_or_else(|error| panic!("{example}: {error}"));
                 let of_subcommand = taken.subcommand_name() == Some(name);
                 assert!(of_subcommand || name == whole.get_name(), "{example}");

@@ -12,6 +12,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+mod apt;
 mod build;
 mod cache;
 mod debian;
@@ -20,6 +21,7 @@ mod pin;
 mod progress;
 mod qemu;
 mod rustup;
+mod settings;
 mod toolchain;
 
 use build::Program;
@@ -33,9 +35,9 @@ pub use qemu::Qemu;
 pub struct Options {
     /// A complete Rust toolchain to use in place of the pinned one; `CRYSTAL_BALL_TOOLCHAIN` says the same.
     pub toolchain: Option<PathBuf>,
-    /// The QEMU to use, in place of the one in `PATH`.
+    /// The QEMU to use, in place of the one in `PATH` or in the cache.
     pub qemu: Option<PathBuf>,
-    /// A window is wanted: QEMU's window packages are looked for, too.
+    /// A window is wanted: a QEMU that can open one is preferred, or fetched.
     pub window: bool,
     /// What the kernel is to find in its ramdisk: a pack, as a rule.
     pub ramdisk: Option<Vec<u8>>,
@@ -77,14 +79,34 @@ pub fn ready_to_measure(options: &Options) -> anyhow::Result<Ready> {
 
 fn ready_with(options: &Options, program: Program) -> anyhow::Result<Ready> {
     let cache = Cache::find()?.lock()?;
-    // First, because it fails at once or asks a question, and the rest takes minutes.
-    let qemu = qemu::get(options)?;
+    // First, because where there is no way to get it this fails at once, and the rest takes minutes.
+    let qemu = qemu::get(&cache, options)?;
     let (kernel, image) = boot_files(&cache, options, program)?;
     Ok(Ready {
         image,
         kernel,
         qemu,
     })
+}
+
+/// Gets the QEMU of one of Debian's suites, such as `bookworm-backports` or `sid`, without a window: from the
+/// cache, or unpacked into it. `cargo run -- qemu --suite bookworm-backports` prints its path.
+///
+/// This is for testing other versions than the installed one. It needs a system with apt-get and its package
+/// sources, and changes nothing on it.
+///
+/// # Errors
+/// When the suite does not exist, or its packages cannot be had.
+pub fn qemu_of_suite(suite: &str) -> anyhow::Result<Qemu> {
+    qemu::of_suite(&Cache::find()?.lock()?, suite)
+}
+
+/// Gets the QEMU alone, which needs no image.
+///
+/// # Errors
+/// As [`ready`].
+pub fn qemu(options: &Options) -> anyhow::Result<Qemu> {
+    qemu::get(&Cache::find()?.lock()?, options)
 }
 
 /// The disk image alone, which needs no QEMU.
@@ -104,7 +126,7 @@ fn boot_files(
     build::cargo_path()?;
     let toolchain = toolchain::get(cache, options)?;
     let maker = build::image_maker(cache, &toolchain)?;
-    let kernel = build::kernel(&toolchain, program)?;
+    let kernel = build::kernel(cache, &toolchain, program)?;
     let ramdisk = options
         .ramdisk
         .as_deref()

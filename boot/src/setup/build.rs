@@ -1,7 +1,7 @@
 //! The nested cargo builds: the kernel, the program that makes the image, and the image.
 //!
-//! A cargo inside a cargo needs a target folder of its own (the outer one holds the lock of its own), and an
-//! environment without the outer one's variables: they would choose the outer compiler, its flags and folders.
+//! A cargo inside a cargo needs a target folder of its own, because the outer cargo holds the lock of its target
+//! folder. The user's flags, profiles and wrappers do not reach these builds: see [settings](super::settings).
 
 use std::env;
 use std::ffi::OsString;
@@ -10,17 +10,25 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::Context;
+use tempfile::TempDir;
 
+use super::apt::sha256;
 use super::cache::Locked;
-use super::debian::sha256;
 use super::pin;
 use super::progress::Step;
+use super::settings;
 use super::toolchain::Toolchain;
 use crate::child::{self, Event};
+
+/// The kernel's cargo home, in the cache.
+const CARGO_HOME: &str = "cargo";
 
 const PACKAGE: &str = "crystal-ball-kernel";
 const TARGET: &str = "x86_64-unknown-none";
 const IMAGE_MAKER: &str = "crystal-ball-image";
+
+/// Is part of the image maker's name in the cache: to be changed when the way of building it changes.
+const WAY: &[u8] = b"2: without the user's settings";
 
 /// A program of the bare machine, with an image of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,10 +93,12 @@ pub fn files(program: Program) -> [PathBuf; 2] {
 }
 
 /// Builds a program's kernel.
-pub fn kernel(toolchain: &Toolchain, program: Program) -> anyhow::Result<PathBuf> {
-    let mut cargo = cargo(toolchain)?;
-    cargo.current_dir(root()).args([
-        "build",
+pub fn kernel(cache: &Locked, toolchain: &Toolchain, program: Program) -> anyhow::Result<PathBuf> {
+    let folder = neutral(cache)?;
+    // Cargo builds again what lies at another path: the home stays.
+    let mut cargo = cargo(toolchain, &cache.path(CARGO_HOME), folder.path())?;
+    cargo.args(["build", "--manifest-path"]);
+    cargo.arg(root().join("Cargo.toml")).args([
         "--release",
         "--locked",
         "-p",
@@ -123,10 +133,14 @@ pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<Path
     }
     cache.room(pin::BUILDS, "building the boot loader")?;
     let aside = cache.aside()?;
-    let mut cargo = cargo(toolchain)?;
+    let folder = neutral(cache)?;
+    // `cargo install` reads the configuration files above its home.
+    let home = folder.path().join("home");
+    let mut cargo = cargo(toolchain, &home, folder.path())?;
     cargo
-        .current_dir(sources)
-        .args(["build", "--locked", "--target-dir"])
+        .args(["build", "--manifest-path"])
+        .arg(sources.join("Cargo.toml"))
+        .args(["--locked", "--target-dir"])
         .arg(aside.path());
     // The boot loader's build runs more cargos, which build in the folder for temporary files.
     cargo.env("TMPDIR", aside.path());
@@ -153,7 +167,7 @@ pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<Path
 /// The image maker's name in the cache, which says all that it depends on, and the folder of its sources.
 pub fn image_maker_name(toolchain: &Toolchain) -> anyhow::Result<(String, PathBuf)> {
     let folder = root().join("boot/image");
-    let mut all = toolchain.version.clone().into_bytes();
+    let mut all = [WAY, toolchain.version.as_bytes()].concat();
     for file in ["Cargo.toml", "Cargo.lock", "src/main.rs"] {
         let file = folder.join(file);
         all.extend(fs::read(&file).with_context(|| format!("{} cannot be read", file.display()))?);
@@ -202,14 +216,21 @@ pub fn cargo_path() -> anyhow::Result<PathBuf> {
     }
 }
 
-/// That cargo, set up for the toolchain.
-fn cargo(toolchain: &Toolchain) -> anyhow::Result<Command> {
+/// A folder without the user's configuration, for one build at a time: the cache is locked.
+fn neutral(cache: &Locked) -> anyhow::Result<TempDir> {
+    settings::neutral(cache.folder().as_os_str())
+}
+
+/// That cargo, set up for the toolchain: it runs in `folder`, and `home` becomes its home.
+fn cargo(toolchain: &Toolchain, home: &Path, folder: &Path) -> anyhow::Result<Command> {
+    settings::make_home(home, &env::current_dir()?, settings::home().as_deref())?;
     let mut command = child::family(cargo_path()?);
-    for (name, _) in env::vars_os().filter(|(name, _)| is_outer(&name.to_string_lossy())) {
-        command.env_remove(name);
-    }
     let programs = toolchain.folder.join("bin");
     command
+        .current_dir(folder)
+        .env_clear()
+        .envs(settings::kept(env::vars_os()))
+        .env("CARGO_HOME", home)
         .env("RUSTC", programs.join("rustc"))
         .env("PATH", first_in_path(&programs)?);
     // The pinned compiler is a stable one; this lets cargo and it take `-Z` options all the same.
@@ -226,29 +247,6 @@ fn first_in_path(folder: &Path) -> anyhow::Result<OsString> {
             .chain(env::split_paths(&path)),
     )
     .context("the cache's path cannot stand in PATH")
-}
-
-/// What the outer cargo says to its children, and what chooses compilers, flags and folders. What the user
-/// says about the network stays.
-fn is_outer(name: &str) -> bool {
-    const KEPT: [&str; 5] = [
-        "CARGO_HOME",
-        "CARGO_NET_",
-        "CARGO_HTTP_",
-        "CARGO_REGISTR",
-        "CARGO_TERM_",
-    ];
-    let cargo = name == "CARGO" || name.starts_with("CARGO_");
-    (cargo && !KEPT.iter().any(|kept| name.starts_with(kept)))
-        || name.starts_with("RUSTC")
-        || [
-            "RUSTFLAGS",
-            "RUSTDOCFLAGS",
-            "RUSTUP_TOOLCHAIN",
-            "RUST_RECURSION_COUNT",
-            "LD_LIBRARY_PATH",
-        ]
-        .contains(&name)
 }
 
 /// Runs a build: silent when there is nothing to do, else announced, with cargo's own words.
@@ -270,37 +268,6 @@ fn build(cargo: &mut Command, what: &str) -> anyhow::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn nested_cargo_sees_nothing_of_the_outer_one_but_the_network() {
-        for outer in [
-            "CARGO",
-            "CARGO_MANIFEST_DIR",
-            "CARGO_TARGET_DIR",
-            "CARGO_BUILD_TARGET",
-            "CARGO_ENCODED_RUSTFLAGS",
-            "RUSTC",
-            "RUSTC_WRAPPER",
-            "RUSTFLAGS",
-            "RUSTUP_TOOLCHAIN",
-            "RUST_RECURSION_COUNT",
-            "LD_LIBRARY_PATH",
-        ] {
-            assert!(is_outer(outer), "{outer}");
-        }
-        for kept in [
-            "CARGO_HOME",
-            "CARGO_NET_OFFLINE",
-            "CARGO_HTTP_PROXY",
-            "CARGO_REGISTRIES_MINE_INDEX",
-            "RUSTUP_HOME",
-            "https_proxy",
-            "PATH",
-            "CARGOT",
-        ] {
-            assert!(!is_outer(kept), "{kept}");
-        }
-    }
 
     #[test]
     fn target_folder_is_the_one_of_this_program() {

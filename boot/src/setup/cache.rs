@@ -4,11 +4,12 @@
 //! place by a rename. A killed run leaves at most its folder aside, which the next holder of the lock removes.
 
 use std::fs::{self, File, TryLockError};
+use std::io::{self, ErrorKind};
 use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::Context;
 use etcetera::BaseStrategy;
 use tempfile::TempDir;
 
@@ -137,12 +138,13 @@ impl Locked {
     pub fn room(&self, needed: u64, what: &str) -> anyhow::Result<()> {
         let free = free(self.folder())?;
         if free < needed {
-            bail!(
+            let text = format!(
                 "{what} needs {} in {}, and {} are free: make room, or set XDG_CACHE_HOME to a folder on another disk",
                 bytes(needed),
                 self.folder().display(),
                 bytes(free)
             );
+            return Err(io::Error::new(ErrorKind::StorageFull, text).into());
         }
         Ok(())
     }
@@ -153,6 +155,23 @@ pub fn free(folder: &Path) -> anyhow::Result<u64> {
     let disk = rustix::fs::statvfs(folder)
         .with_context(|| format!("the free space of {} is unknown", folder.display()))?;
     Ok(disk.f_bavail * disk.f_frsize)
+}
+
+/// Whether an error comes from a disk that is full: then no other way to the same thing is worth a try.
+pub fn is_full(error: &anyhow::Error) -> bool {
+    let by_kind = error.chain().any(|cause| {
+        let kind = cause.downcast_ref().map(io::Error::kind);
+        matches!(
+            kind,
+            Some(ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
+        )
+    });
+    let text = format!("{error:#}");
+    // What a child wrote in its error output.
+    by_kind
+        || ["No space left on device", "Disk quota exceeded"]
+            .iter()
+            .any(|words| text.contains(words))
 }
 
 /// Removes a file or a folder with all that is in it.
@@ -218,5 +237,16 @@ mod tests {
             error.starts_with("the world needs 1.00 EiB in ") && error.contains("are free"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn full_disk_is_known_by_kind_and_by_a_childs_words() {
+        let of_system = io::Error::from_raw_os_error(28);
+        let error = anyhow::Error::from(of_system).context("cannot be written");
+        assert!(is_full(&error));
+        let words = "`dpkg -x` failed\ntar: x: Cannot write: No space left on device";
+        assert!(is_full(&anyhow::Error::msg(words)));
+        assert!(!is_full(&anyhow::Error::msg("no network")));
+        assert!(!is_full(&io::Error::from_raw_os_error(2).into()));
     }
 }

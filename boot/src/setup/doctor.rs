@@ -2,28 +2,38 @@
 
 use std::env;
 use std::io::Write;
+use std::path::Path;
 
 use super::cache::{self, Cache};
 use super::progress::bytes;
 use super::toolchain::{self, Toolchain};
-use super::{Options, build, debian, qemu};
+use super::{Options, Qemu, apt, build, debian, pin, qemu};
 use crate::child;
 
 /// Writes the report; true when nothing is missing.
 pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     let cache = Cache::find()?;
     let toolchain = toolchain::find(&cache, options);
-    let qemu = qemu::find(options);
+    let qemu = qemu::find(&cache, options);
     let mut lines = vec![
-        ("cargo", there(cargo_version())),
-        ("toolchain", toolchain_line(&toolchain)),
+        ("cargo", cargo_line()),
+        ("toolchain", toolchain_line(&cache, &toolchain)),
     ];
+    let can_build = lines
+        .iter()
+        .all(|(_, line)| !matches!(line, Err(Missing::ByHand(_))));
+    let later = |found: Option<String>| {
+        found.ok_or_else(|| match can_build {
+            true => Missing::NextRun("makes it".to_owned()),
+            false => Missing::ByHand("it cannot be built without the above".to_owned()),
+        })
+    };
     if let Ok(Some(toolchain)) = &toolchain {
         let (name, _) = build::image_maker_name(toolchain)?;
         let maker = cache.path(&name);
         lines.push((
             "boot loader",
-            there(build::is_whole(&maker).then(|| maker.display().to_string())),
+            later(build::is_whole(&maker).then(|| maker.display().to_string())),
         ));
     }
     for (what, file) in ["kernel", "disk image"]
@@ -33,35 +43,27 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
         let found = file
             .exists()
             .then(|| format!("{}, {}", file.display(), bytes(cache::size(&file))));
-        lines.push((what, there(found)));
+        lines.push((what, later(found)));
     }
-    lines.push((
-        "QEMU",
-        match &qemu {
-            Ok(Some(qemu)) => Ok(format!("{} in {}", qemu.version, qemu.path.display())),
-            Ok(None) => Err("not installed".to_owned()),
-            Err(error) => Err(format!("{error:#}")),
-        },
-    ));
+    lines.push(("QEMU", qemu_line(&qemu)));
+    if let (Ok(Some(qemu)), true) = (&qemu, options.window) {
+        let window = match qemu.has_window() {
+            true => Ok(format!("displays: {}", qemu.displays.join(", "))),
+            false => fetched("qemu-system-gui"),
+        };
+        lines.push(("window", window));
+    }
     for (what, line) in &lines {
         let (mark, text) = match line {
-            Ok(text) => ("ok     ", text),
-            Err(text) => ("MISSING", text),
+            Ok(text) => ("ok     ", text.clone()),
+            Err(Missing::NextRun(does)) => ("MISSING", format!("the next run {does}")),
+            Err(Missing::ByHand(text)) => {
+                ("MISSING", text.replace('\n', "\n                     "))
+            }
         };
         writeln!(out, "{mark} {what:<12} {text}")?;
     }
     let mut also = |what: &str, text: String| writeln!(out, "        {what:<12} {text}");
-    if let Ok(Some(qemu)) = &qemu {
-        let window = if qemu.has_window() {
-            "can open a window"
-        } else {
-            "no window (Debian: qemu-system-gui)"
-        };
-        also(
-            "",
-            format!("{window}; displays: {}", qemu.displays.join(", ")),
-        )?;
-    }
     let screen = ["WAYLAND_DISPLAY", "DISPLAY"]
         .into_iter()
         .find_map(|name| Some((name, env::var(name).ok()?)));
@@ -102,28 +104,70 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     Ok(lines.iter().all(|(_, line)| line.is_ok()))
 }
 
-fn there(found: Option<String>) -> Result<String, String> {
-    found.ok_or_else(|| "not there yet: the next run makes it".to_owned())
+/// Why a line is not well.
+enum Missing {
+    /// The next run sees to it: what it does.
+    NextRun(String),
+    /// A person has to see to it: what is wrong, and the command to type.
+    ByHand(String),
 }
 
-fn toolchain_line(toolchain: &anyhow::Result<Option<Toolchain>>) -> Result<String, String> {
-    match toolchain {
-        Ok(Some(toolchain)) => {
-            let (folder, size) = (&toolchain.folder, cache::size(&toolchain.folder));
-            Ok(format!(
-                "Rust {} in {}, {}",
-                toolchain.release(),
-                folder.display(),
-                bytes(size)
-            ))
-        }
-        Ok(None) => there(None),
-        Err(error) => Err(format!("{error:#}")),
+fn cargo_line() -> Result<String, Missing> {
+    let version = |cargo: &Path| child::run(child::command(cargo).arg("-V"));
+    match build::cargo_path().and_then(|cargo| Ok((version(&cargo)?, cargo))) {
+        Ok((version, cargo)) => Ok(format!("{} in {}", version.trim(), cargo.display())),
+        Err(error) => Err(Missing::ByHand(format!(
+            "{error:#}\ninstall rustup, which brings cargo: https://rustup.rs"
+        ))),
     }
 }
 
-fn cargo_version() -> Option<String> {
-    let cargo = build::cargo_path().ok()?;
-    let version = child::run(child::command(&cargo).arg("-V")).ok()?;
-    Some(format!("{} in {}", version.trim(), cargo.display()))
+fn toolchain_line(
+    cache: &Cache,
+    toolchain: &anyhow::Result<Option<Toolchain>>,
+) -> Result<String, Missing> {
+    let toolchain = match toolchain {
+        Ok(toolchain) => toolchain,
+        Err(error) => return Err(Missing::ByHand(format!("{error:#}"))),
+    };
+    if let Some(toolchain) = toolchain {
+        let (folder, size) = (&toolchain.folder, cache::size(&toolchain.folder));
+        let (release, folder) = (toolchain.release(), folder.display());
+        return Ok(format!("Rust {release} in {folder}, {}", bytes(size)));
+    }
+    let online = toolchain::offline().is_none();
+    let rustup = which::which("rustup").is_ok();
+    Err(if online && rustup {
+        Missing::NextRun(format!(
+            "downloads Rust {} with rustup into the cache",
+            pin::RUST
+        ))
+    } else if apt::is_here() && apt::kept(&debian::kept(cache)).is_some() {
+        Missing::NextRun("unpacks the packages that are kept".to_owned())
+    } else if online && apt::is_here() {
+        Missing::NextRun(format!(
+            "downloads Debian's packages of Rust {} into the cache",
+            pin::RUST
+        ))
+    } else {
+        Missing::ByHand(toolchain::by_hand())
+    })
+}
+
+fn qemu_line(qemu: &anyhow::Result<Option<Qemu>>) -> Result<String, Missing> {
+    match qemu {
+        Ok(Some(qemu)) => Ok(format!("{} in {}", qemu.version, qemu.path.display())),
+        Ok(None) => fetched("qemu-system-x86"),
+        Err(error) => Err(Missing::ByHand(format!("{error:#}"))),
+    }
+}
+
+/// What is to be done about a package of QEMU's.
+fn fetched(package: &str) -> Result<String, Missing> {
+    Err(match toolchain::offline().is_none() && apt::is_here() {
+        true => Missing::NextRun(format!(
+            "unpacks Debian's package {package} into the cache, and installs nothing"
+        )),
+        false => Missing::ByHand(qemu::by_hand(package)),
+    })
 }

@@ -8,29 +8,19 @@
 /// The compiler and its library sources.
 pub const RUST: &str = "1.96.0";
 
-/// Debian's packages of it. All whose name has `rust` in it are of version [`RUST`].
-pub const DEBIAN: [&str; 7] = [
+/// Debian's packages of it, all of version [`RUST`]. The first one has no version in its name.
+pub const DEBIAN_RUST: [&str; 4] = [
     "rustc-web",
     "libstd-rust-web-dev",
     "libstd-rust-web-1.96",
     "rust-web-src",
-    "llvm-22",
-    "libllvm22",
-    "lld-22",
 ];
+
+/// Debian's packages of the LLVM that the compiler and the boot loader's build use.
+pub const DEBIAN_LLVM: [&str; 3] = ["llvm-22", "lld-22", "libllvm22"];
 
 /// Where Debian's LLVM has its programs, below `usr`.
 pub const LLVM_PROGRAMS: &str = "lib/llvm-22/bin";
-
-/// Libraries that those packages need and a small Debian does not have: file and package.
-pub const DEBIAN_LIBRARIES: [(&str, &str); 6] = [
-    ("libz3.so.4", "libz3-4"),
-    ("libedit.so.2", "libedit2"),
-    ("libbsd.so.0", "libbsd0"),
-    ("libmd.so.0", "libmd0"),
-    ("libxml2.so.2", "libxml2"),
-    ("libicuuc.so.72", "libicu72"),
-];
 
 /// Debian's packages unpacked, on the disk (measured, rounded up).
 pub const DEBIAN_UNPACKED: u64 = 1_000_000_000;

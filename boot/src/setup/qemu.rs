@@ -1,33 +1,26 @@
-//! A QEMU, and whether it can open a window.
+//! A QEMU: the user's choice, the system's, or one unpacked into the cache.
 //!
-//! Installing it changes the system, which is never done silently: as root without a terminal (a container,
-//! CI) after one line that says what and why, on a terminal after a yes, else by the user's own hand. The
-//! installing apt-get is the one child that is *not* killed with this program: half-configured packages are
-//! worse than a moment's wait.
+//! Nothing is ever installed on the system. Where QEMU is missing, or cannot open the window that is wanted,
+//! Debian's packages are unpacked into the cache with the libraries that the system lacks. That needs no
+//! administrator, asks nothing, and cannot conflict with what is installed.
 
-use std::io::{IsTerminal, stderr, stdin};
-use std::os::fd::AsFd;
-use std::path::PathBuf;
-use std::process::Command;
+use std::collections::BTreeSet;
+use std::fs;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::io::Errno;
 
 use super::Options;
+use super::apt::{self, MACHINE, Wanted};
+use super::cache::{Cache, Locked, is_full};
 use super::progress::say;
-use super::toolchain::offline;
-use crate::child::{self, Interrupted, interrupted};
+use crate::child::{self, Interrupted};
 
 const PROGRAM: &str = "qemu-system-x86_64";
-const PACKAGE: &str = "qemu-system-x86";
-const WINDOW_PACKAGE: &str = "qemu-system-gui";
 
-/// How long Ctrl-C may go unheard at a question.
-const STEP: Timespec = Timespec {
-    tv_sec: 0,
-    tv_nsec: 50_000_000,
-};
+/// The packages of the machine, and of the machine with a window.
+const PACKAGES: [&str; 2] = ["qemu-system-x86", "qemu-system-gui"];
 
 /// A QEMU that starts.
 #[derive(Debug, Clone)]
@@ -50,7 +43,7 @@ impl Qemu {
             .unwrap_or_default()
             .split_once(" version ")
         else {
-            bail!("{}: it does not tell its version", failed());
+            bail!("{}: it does not print its version", failed());
         };
         let help =
             child::run(child::command(&path).args(["-display", "help"])).with_context(failed)?;
@@ -67,6 +60,11 @@ impl Qemu {
             .iter()
             .any(|display| display == "gtk" || display == "sdl")
     }
+
+    /// Whether it has all that is asked for.
+    fn will_do(&self, options: &Options) -> bool {
+        self.has_window() || !options.window
+    }
 }
 
 /// Reads `-display help`: a heading, a name a line, and from some versions on an explanation after a gap.
@@ -78,153 +76,185 @@ fn displays(help: &str) -> Vec<String> {
     names.map(|line| line.trim().to_owned()).collect()
 }
 
-/// The QEMU that is there, if any.
+/// The best QEMU that exists: the user's choice, else the system's, else the cache's. One without the window
+/// that is asked for is returned only if there is no better one.
 ///
 /// # Errors
-/// When the one there does not work.
-pub fn find(options: &Options) -> anyhow::Result<Option<Qemu>> {
-    match options.qemu.clone().or_else(|| which::which(PROGRAM).ok()) {
-        Some(path) => Qemu::check(
-            which::which(&path).with_context(|| format!("there is no {}", path.display()))?,
-        )
-        .map(Some),
-        None => Ok(None),
+/// When the user's choice or the system's does not work.
+pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Qemu>> {
+    if let Some(path) = &options.qemu {
+        let found = which::which(path);
+        let found = found.with_context(|| format!("{} does not exist", path.display()))?;
+        return Qemu::check(found).map(Some);
+    }
+    let system = which::which(PROGRAM).ok().map(Qemu::check).transpose()?;
+    if system.as_ref().is_some_and(|qemu| qemu.will_do(options)) {
+        return Ok(system);
+    }
+    let unpacked = in_cache(cache, None)?;
+    let better = unpacked.filter(|qemu| system.is_none() || qemu.will_do(options));
+    Ok(better.or(system))
+}
+
+/// The folder of an unpacked QEMU in the cache: the system's suite, or another one.
+fn folder(suite: Option<&str>) -> String {
+    suite.map_or_else(|| "qemu".to_owned(), |suite| format!("qemu-{suite}"))
+}
+
+/// The QEMU that was unpacked into the cache, if it still works: it also needs libraries of the system.
+fn in_cache(cache: &Cache, suite: Option<&str>) -> anyhow::Result<Option<Qemu>> {
+    let program = cache.path(&folder(suite)).join("bin").join(PROGRAM);
+    if !program.exists() {
+        return Ok(None);
+    }
+    match Qemu::check(program) {
+        Ok(qemu) => Ok(Some(qemu)),
+        Err(error) if error.is::<Interrupted>() => Err(error),
+        Err(error) => {
+            say(format_args!("the kept QEMU is not used: {error:#}"));
+            Ok(None)
+        }
     }
 }
 
-/// Finds a QEMU, or installs one where that is allowed; the same for its window, where one is wanted.
+/// Finds a QEMU, or unpacks one into the cache.
 ///
 /// # Errors
-/// When there is none, with the command that installs it. Being without a window is no error.
-pub fn get(options: &Options) -> anyhow::Result<Qemu> {
-    let again = || find(options)?.with_context(|| format!("there is still no {PROGRAM} in PATH"));
-    let mut qemu = match find(options)? {
-        Some(qemu) => qemu,
-        None => {
-            let missing =
-                format!("{PROGRAM} is not installed, and it is the machine that the demo runs on");
-            install(PACKAGE, &missing)?;
-            again()?
-        }
-    };
-    // A QEMU of the user's own choice does not load Debian's modules.
-    if options.window && options.qemu.is_none() && !qemu.has_window() {
-        match install(WINDOW_PACKAGE, "this QEMU cannot open a window") {
-            Ok(()) => qemu = again()?,
-            Err(error) if error.is::<Interrupted>() => return Err(error),
-            Err(error) => say(format_args!("{error:#}")),
-        }
+/// When there is no way to get one: the message says what was tried and what to do. Being without the window
+/// that is asked for is no error.
+pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Qemu> {
+    let found = find(cache, options)?;
+    // A QEMU of the user's own choice is taken as it is.
+    if let Some(qemu) = &found
+        && (qemu.will_do(options) || options.qemu.is_some())
+    {
+        return Ok(qemu.clone());
     }
-    Ok(qemu)
-}
-
-/// Who may install, and how.
-#[derive(Debug, PartialEq, Eq)]
-enum Right {
-    /// At once.
-    Now,
-    /// After a yes, as root or through sudo.
-    Ask { sudo: bool },
-    /// Only the user's own hand.
-    None,
-}
-
-fn right(root: bool, terminal: bool, sudo: bool) -> Right {
-    match (root, terminal) {
-        (true, false) => Right::Now,
-        (false, true) if !sudo => Right::None,
-        (_, true) => Right::Ask { sudo: !root },
-        (false, false) => Right::None,
+    match (unpack(cache, options.window, None), found) {
+        (Ok(qemu), _) => Ok(qemu),
+        (Err(error), _) if error.is::<Interrupted>() || is_full(&error) => Err(error),
+        (Err(error), Some(qemu)) => {
+            say(format_args!(
+                "{} cannot open a window, and no other QEMU was found: {error:#}\n{}",
+                qemu.path.display(),
+                by_hand("qemu-system-gui")
+            ));
+            Ok(qemu)
+        }
+        (Err(error), None) => Err(error.context(format!(
+            "QEMU is needed, and is neither installed nor to be had from Debian's packages\n{}\n\
+             - name a {PROGRAM} that you have: --qemu PATH",
+            by_hand(PACKAGES[0])
+        ))),
     }
 }
 
-fn install(package: &str, why: &str) -> anyhow::Result<()> {
-    if which::which("apt-get").is_err() {
-        bail!(
-            "{why}; install QEMU for x86_64 with your system's package manager (Debian calls it {package}), or name one with --qemu PATH"
-        );
+/// What a person can do about a missing package.
+pub fn by_hand(package: &str) -> String {
+    format!(
+        "Do one of these, then try again:\n\
+         - install QEMU for x86_64 with your system's package manager, or ask your administrator to \
+         (Debian, Ubuntu: sudo apt-get install {package})"
+    )
+}
+
+/// The QEMU of one of Debian's suites, such as `bookworm-backports` or `sid`, without a window: from the cache,
+/// or unpacked into it. It needs a system with apt-get, and changes nothing on it.
+///
+/// # Errors
+/// When the suite does not exist or its packages cannot be had.
+pub fn of_suite(cache: &Locked, suite: &str) -> anyhow::Result<Qemu> {
+    let name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
+    if !suite.starts_with(|c: char| c.is_ascii_alphanumeric()) || !suite.chars().all(name) {
+        bail!("'{suite}' is not the name of a Debian suite; one is: bookworm-backports");
     }
-    let root = rustix::process::geteuid().is_root();
-    let right = right(
-        root,
-        stdin().is_terminal() && stderr().is_terminal(),
-        which::which("sudo").is_ok(),
-    );
-    let by_hand = format!(
-        "{0}apt-get update && {0}apt-get install --no-install-recommends {package}",
-        if root { "" } else { "sudo " }
-    );
-    if offline().is_some() || right == Right::None {
-        bail!("{why}; install it with\n  {by_hand}");
+    match in_cache(cache, Some(suite))? {
+        Some(qemu) => Ok(qemu),
+        None => unpack(cache, false, Some(suite)),
     }
-    if let Right::Ask { .. } = right {
-        say(format_args!(
-            "{why}. Install it on this system, with\n  {by_hand}\nnow? [y/N]"
-        ));
-        if !matches!(answer()?.trim().to_lowercase().as_str(), "y" | "yes") {
-            bail!("{why}; when you want it:\n  {by_hand}");
-        }
+}
+
+/// Unpacks Debian's packages of QEMU into the cache.
+fn unpack(cache: &Locked, window: bool, suite: Option<&str>) -> anyhow::Result<Qemu> {
+    let what = if window {
+        "QEMU and its window"
     } else {
-        say(format_args!(
-            "{why}: installing Debian's package {package} on this system (apt-get, as root)"
-        ));
+        "QEMU"
+    };
+    let wanted = Wanted {
+        what,
+        alone: &[],
+        whole: &PACKAGES[..1 + usize::from(window)],
+        // The system's may be of another version than the program.
+        own: &["qemu-", "seabios", "ipxe-qemu"],
+        never: &[],
+        suite,
+        check: |_| Ok(()),
+        // Measured: 4 times the packages, unpacked.
+        room: |bytes| 5 * bytes,
+    };
+    let aside = cache.aside()?;
+    let (packages, made) = (aside.path().join("packages"), aside.path().join("made"));
+    fs::create_dir(&made)?;
+    let list = apt::fetch(cache, &wanted, &packages)?;
+    apt::unpack(what, &list, &packages, &made)?;
+    arrange(&made).context("Debian's packages are not laid out as expected")?;
+    // Where it is, before it takes the place of one that may be there.
+    Qemu::check(made.join("bin").join(PROGRAM))?;
+    let place = cache.put(&made, &folder(suite))?;
+    say(format_args!("QEMU is in {}", place.display()));
+    Qemu::check(place.join("bin").join(PROGRAM))
+}
+
+/// Puts a script into `bin` that starts the QEMU in `usr` with its own libraries, modules and firmware.
+fn arrange(made: &Path) -> anyhow::Result<()> {
+    let libraries = format!("usr/lib/{MACHINE}-linux-gnu");
+    if !made.join("usr/bin").join(PROGRAM).exists() {
+        bail!("there is no usr/bin/{PROGRAM}");
     }
-    let sudo = right == Right::Ask { sudo: true };
-    for arguments in [
-        &["update"][..],
-        &["install", "-y", "--no-install-recommends", package],
-    ] {
-        let mut command = Command::new(if sudo { "sudo" } else { "apt-get" });
-        if sudo {
-            command.args(["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"]);
-        }
-        command.env("DEBIAN_FRONTEND", "noninteractive").args([
-            "-q",
-            "-o",
-            "DPkg::Lock::Timeout=120",
-        ]);
-        command
-            .args(arguments)
-            .stdout(stderr().as_fd().try_clone_to_owned()?);
-        let status = command
-            .status()
-            .with_context(|| format!("{} cannot be started", child::line(&command)))?;
-        if interrupted() {
-            return Err(Interrupted.into());
-        }
-        // An update fails with its worst source; the install tells whether it matters.
-        if !status.success() && arguments != ["update"] {
-            bail!(
-                "{why}, and `{}` failed ({status}); by hand:\n  {by_hand}",
-                child::line(&command)
-            );
-        }
-    }
+    let mut folders = BTreeSet::new();
+    with_libraries(made, Path::new(&libraries), &mut folders)?;
+    let path = folders
+        .iter()
+        .map(|folder| format!("$top/{folder}"))
+        .collect::<Vec<_>>()
+        .join(":");
+    // The C library comes with its own loader, and works with no other.
+    let loader = fs::read_dir(made.join(&libraries))?
+        .flatten()
+        .map(|entry| entry.file_name().to_string_lossy().into_owned())
+        .find(|name| name.starts_with("ld-linux"));
+    let start = match loader {
+        Some(loader) => format!("exec \"$top/{libraries}/{loader}\" --library-path \"{path}\""),
+        None => format!("LD_LIBRARY_PATH={path} exec"),
+    };
+    let text = format!(
+        "#!/bin/sh\n\
+         top=${{0%/*}}/..\n\
+         export QEMU_MODULE_DIR=\"$top/{libraries}/qemu\"\n\
+         export XDG_DATA_DIRS=\"${{XDG_DATA_DIRS:-/usr/local/share:/usr/share}}:$top/usr/share\"\n\
+         {start} \"$top/usr/bin/{PROGRAM}\" -L \"$top/usr/share/qemu\" -L \"$top/usr/share/seabios\" \
+         -L \"$top/usr/lib/ipxe/qemu\" \"$@\"\n"
+    );
+    let script = made.join("bin").join(PROGRAM);
+    fs::create_dir(made.join("bin"))?;
+    fs::write(&script, text)?;
+    fs::set_permissions(&script, fs::Permissions::from_mode(0o755))?;
     Ok(())
 }
 
-/// A line from the terminal.
-fn answer() -> anyhow::Result<String> {
-    let input = stdin();
-    // `read_line` alone goes on after a signal, and the user would have to type Ctrl-C twice.
-    loop {
-        if interrupted() {
-            return Err(Interrupted.into());
-        }
-        match poll(&mut [PollFd::new(&input, PollFlags::IN)], Some(&STEP)) {
-            Ok(0) | Err(Errno::INTR) => {}
-            Ok(_) => break,
-            Err(error) => return Err(error).context("the terminal cannot be read"),
+/// Collects the folders below `folder` that have shared libraries in them, as paths from `top`.
+fn with_libraries(top: &Path, folder: &Path, folders: &mut BTreeSet<String>) -> anyhow::Result<()> {
+    for entry in fs::read_dir(top.join(folder))? {
+        let entry = entry?;
+        let name = entry.file_name().to_string_lossy().into_owned();
+        if entry.file_type()?.is_dir() {
+            with_libraries(top, &folder.join(&name), folders)?;
+        } else if name.starts_with("lib") && name.contains(".so") {
+            folders.insert(folder.display().to_string());
         }
     }
-    let mut answer = String::new();
-    let read = input.read_line(&mut answer);
-    // The terminal was closed: that is a signal and an error.
-    if interrupted() {
-        return Err(Interrupted.into());
-    }
-    read.context("the terminal cannot be read")?;
-    Ok(answer)
+    Ok(())
 }
 
 #[cfg(test)]
@@ -239,15 +269,5 @@ mod tests {
         assert_eq!(displays(old), ["none", "gtk", "egl-headless"]);
         assert_eq!(displays(&new), displays(old));
         assert_eq!(displays(""), [""; 0]);
-    }
-
-    #[test]
-    fn system_is_changed_only_by_root_or_after_a_question() {
-        assert_eq!(right(true, false, false), Right::Now);
-        assert_eq!(right(true, true, false), Right::Ask { sudo: false });
-        assert_eq!(right(false, true, true), Right::Ask { sudo: true });
-        for (terminal, sudo) in [(true, false), (false, true), (false, false)] {
-            assert_eq!(right(false, terminal, sudo), Right::None);
-        }
     }
 }

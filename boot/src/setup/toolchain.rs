@@ -4,15 +4,13 @@
 //! with which the boot loader's build makes flat binaries. Plain stable toolchains have the first only.
 
 use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use toml::de::DeTable;
 
-use super::cache::{Cache, Locked};
+use super::cache::{Cache, Locked, is_full};
 use super::progress::say;
-use super::{Options, debian, pin, rustup};
+use super::{Options, debian, pin, rustup, settings};
 use crate::child::{self, Interrupted};
 
 /// Names a complete toolchain in the environment.
@@ -133,31 +131,43 @@ pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Toolchain> {
     }
     let by_rustup = match rustup::download(cache) {
         Ok(toolchain) => return Ok(toolchain),
-        Err(error) if error.is::<Interrupted>() => return Err(error),
+        Err(error) if error.is::<Interrupted>() || is_full(&error) => return Err(error),
         Err(error) => error,
     };
     say(format_args!(
-        "no Rust {} from rustup ({}); trying Debian's packages",
+        "Rust {} does not come from rustup ({}); trying Debian's packages",
         pin::RUST,
         reason(&by_rustup)
     ));
     let by_debian = match debian::install(cache) {
         Ok(toolchain) => return Ok(toolchain),
-        Err(error) if error.is::<Interrupted>() => return Err(error),
+        Err(error) if error.is::<Interrupted>() || is_full(&error) => return Err(error),
         Err(error) => error,
     };
     bail!(
-        "Rust {rust} with its library sources is needed, and there was no way to get it.\n\
+        "Rust {} with its library sources is needed, and both ways to get it failed.\n\
          - rustup: {}\n\
          - Debian's packages: {}\n\
          Do one of these by hand, then try again:\n\
-         - with rustup: rustup toolchain install {rust} --profile minimal --component rust-src --component llvm-tools\n\
-         - with any complete toolchain in a folder DIR: --toolchain DIR, or {VARIABLE}=DIR\n\
-         (Tried on Debian 12, x86_64, both ways; on no other system.)",
+         - with rustup: {}\n\
+         - with any complete toolchain in a folder DIR: --toolchain DIR, or {VARIABLE}=DIR",
+        pin::RUST,
         indented(&by_rustup),
         indented(&by_debian),
-        rust = pin::RUST,
+        by_hand(),
     );
+}
+
+/// What a person types to get the pinned toolchain.
+pub fn by_hand() -> String {
+    let first = match which::which("rustup") {
+        Ok(_) => "",
+        Err(_) => "install rustup (https://rustup.rs; it needs no administrator), then ",
+    };
+    format!(
+        "{first}rustup toolchain install {} --profile minimal --component rust-src --component llvm-tools",
+        pin::RUST
+    )
 }
 
 /// An error in one line: what a program gave as its error, else how the message begins.
@@ -176,10 +186,7 @@ fn indented(error: &anyhow::Error) -> String {
 /// Cargo's word that the network must not be used: the setting that says so.
 pub fn offline() -> Option<String> {
     let folder = env::current_dir().unwrap_or_default();
-    let home = env::var_os("CARGO_HOME")
-        .filter(|home| !home.is_empty())
-        .map(PathBuf::from)
-        .or_else(|| Some(env::home_dir()?.join(".cargo")));
+    let home = settings::home();
     offline_by(env::var(OFFLINE).ok().as_deref(), &folder, home.as_deref())
 }
 
@@ -188,28 +195,19 @@ fn offline_by(variable: Option<&str>, folder: &Path, home: Option<&Path>) -> Opt
     if let Some(value) = variable {
         return matches!(value, "true" | "1").then(|| OFFLINE.to_owned());
     }
-    let folders = folder.ancestors().map(|folder| folder.join(".cargo"));
-    // Of two in one folder cargo reads the one with the old name.
-    let mut files = folders
-        .chain(home.map(Path::to_owned))
-        .filter_map(|folder| {
-            let names = ["config", "config.toml"].map(|name| folder.join(name));
-            names.into_iter().find(|file| file.exists())
-        });
+    let mut files = settings::files(folder, home).into_iter();
     let (says, file) = files.find_map(|file| Some((net_offline(&file)?, file)))?;
     says.then(|| format!("net.offline in {}", file.display()))
 }
 
-/// What a configuration file says; a broken one says nothing here, as cargo itself complains about it.
 fn net_offline(file: &Path) -> Option<bool> {
-    let text = fs::read_to_string(file).ok()?;
-    let table = DeTable::parse(&text).ok()?;
-    let net = table.get_ref().get("net")?.get_ref();
-    net.get("offline")?.get_ref().as_bool()
+    settings::read(file).get("net")?.get("offline")?.as_bool()
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
