@@ -17,11 +17,24 @@ pub struct Look {
     #[arg(long, global = true, value_name = "NAME")]
     pub scene: Option<Named<&'static str>>,
     /// How textures are mapped
-    #[arg(long, global = true, value_name = "NAME", value_parser = Mappers)]
+    #[arg(long, global = true, value_name = "NAME", value_parser = Mappers,
+        help = with_default("How textures are mapped", Mapper::default()))]
     pub mapper: Option<Mapper>,
     /// In which order the columns of a picture are drawn, and where to
-    #[arg(long, global = true, value_name = "NAME")]
+    #[arg(long, global = true, value_name = "NAME",
+        help = with_default("In which order the columns of a picture are drawn, and where to", name_of(Order::default())))]
     pub order: Option<Named<Order>>,
+}
+
+/// A help text with the default, as clap shows it.
+fn with_default(help: &str, default: impl Display) -> String {
+    format!("{help} [default: {default}]")
+}
+
+/// An order's name on the command line.
+fn name_of(order: Order) -> &'static str {
+    let named = Order::ALL.into_iter().find(|(_, other, _)| *other == order);
+    named.map_or("", |(name, ..)| name)
 }
 
 impl Look {

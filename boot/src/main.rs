@@ -602,7 +602,7 @@ mod tests {
             }
         }
         let mapper = texmap::Mapper::default().to_string();
-        for default in ["ball", mapper.as_str(), "polygons"] {
+        for default in ["ball, or your own model", mapper.as_str(), "polygons"] {
             let shown = format!("[default: {default}]");
             assert!(help("dump").contains(&shown), "{shown}");
         }
