@@ -181,7 +181,72 @@ fn stem(picture: Picture, motion: Option<Motion>, content: Content) -> String {
 
 #[cfg(test)]
 mod tests {
+    use link::dump::Header;
+    use texmap::Mapper;
+
     use super::*;
+    use crate::card::{self, Emulated};
+    use crate::dump::Dump;
+    use crate::look::Named;
+
+    /// From the log of a show in reduced quality to a header, and from the header to the same bytes.
+    #[test]
+    fn a_frame_of_reduced_quality_is_drawn_again_from_its_header() {
+        let mut memory = card::memory();
+        let mut card = Emulated::new(&mut memory).unwrap();
+        for line in ["scene cube", "mapper exact", "steer 5 quality", "show at 9"] {
+            card.ask(Command::parse(line).unwrap()).unwrap();
+        }
+        let shown = card.dump(Content::Page).unwrap();
+        assert_eq!(shown.header.picture, Some(Picture::Frame(9)));
+        let motion = shown.header.motion.expect("it is in reduced quality");
+        let Motion {
+            yaw,
+            pitch,
+            roll,
+            distance,
+        } = motion;
+        let folder = tempfile::tempdir().unwrap();
+        let frames = |motion| Frames {
+            which: Which {
+                single: vec![9],
+                ranges: Vec::new(),
+                pose: Vec::new(),
+            },
+            motion,
+            all: false,
+            out: folder.path().into(),
+        };
+        let look = Look {
+            scene: Some(Named("cube")),
+            mapper: Mapper::parse("exact"),
+            order: None,
+        };
+        let mut drawn = |motion| {
+            let mut files = Vec::new();
+            let wrote = |file: &Path| {
+                files.push(file.to_path_buf());
+                Ok(())
+            };
+            frames(motion).write(&mut card, &look, wrote).unwrap();
+            Dump::read(&std::fs::read(&files[0]).unwrap()).unwrap()
+        };
+        let again = drawn(Some(vec![yaw, pitch, roll, distance]));
+        let start = again.header.start;
+        assert_eq!(
+            again.header,
+            Header {
+                start,
+                ..shown.header
+            }
+        );
+        assert!(again.pixels == shown.pixels && again.palette == shown.palette);
+        let whole = drawn(None);
+        assert_eq!(whole.header.motion, None);
+        assert!(whole.pixels != shown.pixels);
+        // Two qualities of a frame do not overwrite each other.
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
+    }
 
     #[test]
     fn ranges_are_half_open_unless_they_say_otherwise() {

@@ -143,3 +143,16 @@ impl fmt::Display for Change {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn four_actions_change_only_how_a_show_is_looked_at() {
+        for (name, action) in Action::ALL {
+            let overlay = ["help", "info", "split", "hint"].contains(&name);
+            assert_eq!(action.is_overlay(), overlay, "{name}");
+        }
+    }
+}

@@ -148,3 +148,26 @@ impl Exit {
             .find(|exit| exit.code() == code)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exit_has_a_code_of_its_own_and_comes_back_from_it() {
+        let codes = [
+            (Exit::Left, 33),
+            (Exit::Panic, 35),
+            (Exit::Exception, 37),
+            (Exit::Adapter, 39),
+        ];
+        for (exit, code) in codes {
+            assert_eq!(exit.code(), code);
+            assert_eq!(Exit::from_code(code), Some(exit));
+        }
+        // Those of QEMU itself, of a write that QEMU does not make, and of a signal.
+        for code in [0, 1, 31, 34, 41, 139, -1] {
+            assert_eq!(Exit::from_code(code), None);
+        }
+    }
+}

@@ -517,6 +517,7 @@ mod tests {
     use scene::catalogue::CATALOGUE;
     use std::boxed::Box;
     use std::string::String;
+    use std::vec::Vec;
 
     const INKS: Inks = Inks {
         plain: 1,
@@ -575,6 +576,242 @@ mod tests {
         let longest = KEYS.iter().map(|key| key.about.len()).max().unwrap();
         assert!(MARGIN + (6 + longest) * ADVANCE < WIDTH, "{longest}");
         assert!(MARGIN + KEYS.len() * LINE < HEIGHT);
+    }
+
+    /// The text that is written from (x, y) on up to a gap of three letters, in capitals, since small
+    /// letters look the same; and its ink.
+    fn read(writing: &Writing, x: usize, y: usize) -> Option<(Ink, String)> {
+        let letter = |columns: &[Column; WIDTH], x: usize| {
+            let has = |row: usize, column: usize| columns[x + column].has(y + row);
+            let glyph: font::Glyph = array::from_fn(|row| {
+                let columns = (0..font::WIDTH).filter(|&column| has(row, column));
+                columns.map(|column| 1 << column).sum()
+            });
+            (' '..='~').find(|&known| font::glyph(known) == glyph)
+        };
+        let inks = [(Ink::Plain, &writing.plain), (Ink::Bright, &writing.bright)];
+        inks.into_iter().find_map(|(ink, columns)| {
+            let letters = (x..WIDTH - ADVANCE).step_by(ADVANCE);
+            let text: String = letters.map(|x| letter(columns, x).unwrap_or('?')).collect();
+            // Behind the text another one may follow.
+            let text = text.split("   ").next()?.trim_end();
+            (!text.is_empty()).then(|| (ink, text.into()))
+        })
+    }
+
+    /// The lines of text from the top left down.
+    fn lines(overlay: &Overlay<'_>) -> Vec<(Ink, String)> {
+        let lines = (MARGIN..HEIGHT - LINE).step_by(LINE);
+        lines
+            .map_while(|y| read(overlay.writing, MARGIN, y))
+            .collect()
+    }
+
+    const FIGURES: Figures = Figures {
+        scene: "ball",
+        mapper: Mapper::Exact,
+        order: Order::Planes,
+        paused: false,
+        lowered: None,
+        pixels: 12_345,
+        most: 0,
+        map_masks: 678,
+    };
+
+    /// A pixel and a half a tick, a quarter of half a period.
+    const MOTION: Motion = Motion {
+        pixels: 3 << 15,
+        part: 1 << 14,
+    };
+
+    fn overlay(writing: &mut Writing) -> Overlay<'_> {
+        Overlay::new(writing, CATALOGUE[0].scene(&[]).palette)
+    }
+
+    /// What the info says after half a second of pictures, each `every` ticks after the one before.
+    fn info(every: u32, figures: &Figures, motion: Option<Motion>) -> Vec<(Ink, String)> {
+        let mut writing = Box::new(Writing::new());
+        let mut overlay = overlay(&mut writing);
+        overlay.act(0, Action::Info);
+        for tick in (0..=60).step_by(every as usize) {
+            assert!(overlay.prepare(tick, figures, || motion));
+            overlay.took(2_567);
+        }
+        lines(&overlay)
+    }
+
+    fn plain(text: &str) -> (Ink, String) {
+        (Ink::Plain, text.to_uppercase())
+    }
+
+    fn bright(text: &str) -> (Ink, String) {
+        (Ink::Bright, text.to_uppercase())
+    }
+
+    #[test]
+    fn info_tells_pace_work_and_motion() {
+        let figures = [
+            bright("ball"),
+            bright("exact  planes"),
+            plain("60.0 frames/s  2.56 ms"),
+            plain("12345 pixels"),
+            plain("678 Map Masks"),
+        ];
+        assert_eq!(info(1, &FIGURES, None), figures);
+        let moves = [
+            plain("1.50 pixels a frame"),
+            bright("sweet spot 0.19 to 6.00"),
+        ];
+        assert_eq!(info(1, &FIGURES, Some(MOTION))[5..], moves);
+        // Four ticks a frame: four times the motion, and steps that come a quarter as often.
+        let slow = info(4, &FIGURES, Some(MOTION));
+        assert_eq!(slow[2], plain("15.0 frames/s  2.56 ms"));
+        let moves = [
+            plain("6.00 pixels a frame"),
+            bright("sweet spot 0.79 to 6.00"),
+        ];
+        assert_eq!(slow[5..], moves);
+    }
+
+    #[test]
+    fn info_says_whether_the_motion_is_in_the_sweet_spot() {
+        let says = |every, pixels, part| {
+            let motion = Some(Motion { pixels, part });
+            info(every, &FIGURES, motion)[5..].to_vec()
+        };
+        assert_eq!(
+            says(1, 6_560, 1 << 14)[1],
+            plain("sweet spot 0.19 to 0.40: too slow")
+        );
+        assert_eq!(
+            says(1, 3 << 15, 1 << 17)[1],
+            plain("sweet spot 0.19 to 0.75: too fast")
+        );
+        assert_eq!(
+            says(10, 3 << 15, 3 << 16)[1],
+            plain("sweet spot 2.00 to 0.50: too few frames")
+        );
+        // Nothing moves in the texture.
+        assert_eq!(says(1, 3 << 15, 0), [plain("1.50 pixels a frame")]);
+    }
+
+    #[test]
+    fn info_tells_reduced_quality_tolerance_and_pause() {
+        let last = |figures: Figures| info(1, &figures, None)[5..].to_vec();
+        let lowered = |mapper, faces| Figures {
+            mapper,
+            lowered: Some(faces),
+            ..FIGURES
+        };
+        assert_eq!(
+            last(lowered(Mapper::Exact, 3)),
+            [plain("faces in lower quality: 3")]
+        );
+        let affine = Mapper::default();
+        assert_eq!(
+            last(lowered(affine, 0)),
+            [plain("no lower quality than shifts")]
+        );
+        let within = Mapper::parse("within-1/4").unwrap();
+        let paused = Figures {
+            paused: true,
+            ..lowered(within, 0)
+        };
+        assert_eq!(
+            last(paused),
+            [
+                plain("at most 1/4 texel off"),
+                plain("faces in lower quality: 0"),
+                bright("paused")
+            ]
+        );
+    }
+
+    /// Figures that change with every picture could not be read.
+    #[test]
+    fn info_changes_twice_a_second_and_knows_no_pace_over_a_gap() {
+        let mut writing = Box::new(Writing::new());
+        let mut overlay = overlay(&mut writing);
+        overlay.act(0, Action::Info);
+        let mut pixels = |tick, pixels| {
+            let figures = Figures { pixels, ..FIGURES };
+            overlay.prepare(tick, &figures, || None);
+            lines(&overlay)
+        };
+        assert_eq!(pixels(0, 1)[2], plain("1 pixels"));
+        assert_eq!(pixels(29, 2)[2], plain("1 pixels"));
+        assert_eq!(
+            pixels(30, 3)[2..4],
+            [plain("4.0 frames/s  0.00 ms"), plain("3 pixels")]
+        );
+        assert_eq!(pixels(59, 4)[3], plain("3 pixels"));
+        // A gap of 50 seconds and more is no pace.
+        assert_eq!(pixels(30 + 2999, 5)[2], plain("0.0 frames/s  0.00 ms"));
+        assert_eq!(
+            pixels(30 + 2999 + 3000, 6)[2..4],
+            [plain("0.0 frames/s  0.00 ms"), plain("6 pixels")]
+        );
+    }
+
+    #[test]
+    fn help_has_a_line_for_each_key() {
+        let mut writing = Box::new(Writing::new());
+        let mut overlay = overlay(&mut writing);
+        overlay.act(0, Action::Help);
+        assert!(overlay.prepare(0, &FIGURES, || None));
+        for (i, key) in KEYS.iter().enumerate() {
+            let y = MARGIN + i * LINE;
+            let about = read(overlay.writing, MARGIN + 6 * ADVANCE, y);
+            assert_eq!(about, Some(plain(key.about)));
+            let mut name = String::new();
+            let letters = (MARGIN..).step_by(ADVANCE).take(key.name.len());
+            for (x, letter) in letters.zip(key.name.chars()) {
+                let has =
+                    |row: usize, column: usize| overlay.writing.bright[x + column].has(y + row);
+                let drawn = font::glyph(letter)
+                    .into_iter()
+                    .enumerate()
+                    .all(|(row, bits)| {
+                        (0..font::WIDTH).all(|column| has(row, column) == (bits >> column & 1 == 1))
+                    });
+                assert!(drawn, "{name}: {letter}");
+                name.push(letter);
+            }
+        }
+        overlay.act(0, Action::Help);
+        assert!(!overlay.prepare(0, &FIGURES, || None));
+        assert_eq!(lines(&overlay), []);
+    }
+
+    #[test]
+    fn a_split_view_names_its_parts_and_a_hint_stays_five_seconds() {
+        let mut writing = Box::new(Writing::new());
+        let mut overlay = overlay(&mut writing);
+        let bottom = HEIGHT - MARGIN - font::HEIGHT;
+        overlay.act(7, Action::Hint);
+        for (tick, hint) in [(7, true), (306, true), (307, false), (308, false)] {
+            assert_eq!(overlay.prepare(tick, &FIGURES, || None), hint, "{tick}");
+            let x = (WIDTH - 7 * ADVANCE) / 2;
+            let written = read(overlay.writing, x, bottom);
+            assert_eq!(written, hint.then(|| plain("H: help")), "{tick}");
+        }
+        overlay.act(400, Action::Split);
+        let figures = Figures {
+            most: 3 << 15,
+            lowered: Some(1),
+            ..FIGURES
+        };
+        assert!(overlay.prepare(400, &figures, || None));
+        let texts = split::WINDOWS.map(|x| read(overlay.writing, x + MARGIN, bottom).unwrap().1);
+        assert_eq!(texts, ["EXACT~", "EXACT", "MOST 1.50 TEXEL"]);
+        let y = split::LEGEND_Y + split::LEGEND_LINES + 3;
+        let step = |step: usize| split::LEGEND_X + step * split::LEGEND_STEP;
+        let first = read(overlay.writing, step(1), y).unwrap().1;
+        assert!(first.starts_with("1/256"), "{first}");
+        let last = read(overlay.writing, step(split::STEPS - 1) - ADVANCE, y);
+        assert_eq!(last, Some(plain("64")));
+        let one = read(overlay.writing, step(split::TEXEL), y).unwrap().1;
+        assert!(one.starts_with('1'), "{one}");
     }
 
     #[test]
