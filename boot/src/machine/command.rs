@@ -73,7 +73,7 @@ pub fn option(word: &str) -> Option<&str> {
 }
 
 /// Whether the arguments name an accelerator, in any of QEMU's spellings.
-fn names_accelerator(arguments: &[OsString]) -> bool {
+pub fn names_accelerator(arguments: &[OsString]) -> bool {
     let words: Vec<_> = arguments
         .iter()
         .map(|word| word.to_string_lossy())

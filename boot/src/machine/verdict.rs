@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::SystemTime;
 
-use super::command::option;
+use super::command::{names_accelerator, option};
 use crate::screen::Screen;
 
 /// The memory that the image boots with on every QEMU tried: 7.2 needs 25 MiB, 10 and later up to
@@ -161,6 +161,11 @@ impl Found {
                 "CPU: it has no long mode, and the kernel is 64-bit code; name a 64-bit CPU \
                  (`-cpu qemu64`)"
                     .into(),
+            );
+        }
+        if names_accelerator(&self.arguments) {
+            causes.push(
+                "accelerator: the image is tried with TCG only; leave yours out to use it".into(),
             );
         }
         for word in &self.arguments {
@@ -369,6 +374,7 @@ mod tests {
                 },
                 "no long mode",
             ),
+            (with(&["-accel", "kvm"]), "leave yours out"),
             (with(&["-bios", "other.bin"]), "`-bios`"),
             (with(&["--kernel", "vmlinuz"]), "`--kernel`"),
             (with(&["-drive", "if=pflash,file=x"]), "`if=pflash,file=x`"),
