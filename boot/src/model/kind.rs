@@ -5,7 +5,7 @@ use file_format::FileFormat;
 /// Returns the name of the format that a file begins as; none for a format that is not known, and
 /// for text of any kind. `size` is the whole file's, where it is known.
 pub fn name(begin: &[u8], size: Option<usize>) -> Option<String> {
-    // As far as any format is told by.
+    // No format needs more bytes than this to be recognised.
     let begin = &begin[..begin.len().min(4096)];
     match begin {
         [0xFF, 0xFE, 0, 0, ..] | [0, 0, 0xFE, 0xFF, ..] => return Some("UTF-32 text".into()),

@@ -316,7 +316,7 @@ impl<'a> Apt<'a> {
 
     /// Makes a folder of sources: the system's, and this suite of the same archive.
     fn add_source(&self, suite: &str) -> anyhow::Result<()> {
-        // What it would fetch: `'http://deb.debian.org/debian/dists/bookworm/InRelease' ...`.
+        // apt-get lists what it would fetch: `'http://HOST/debian/dists/bookworm/InRelease' ...`.
         let mut ask = self.command();
         let known = child::run(ask.args(["--print-uris", "update"]))?;
         let archive = known
