@@ -10,7 +10,7 @@ use std::path::Path;
 /// Longest quotation, in characters.
 const MOST: usize = 40;
 
-/// Returns foreign bytes in single quotes: escaped, and cut after [`MOST`] characters.
+/// Returns foreign bytes in single quotes: escaped, and cut after 40 characters.
 ///
 /// A cut quotation ends in `...` and the number of bytes that the whole has.
 pub fn quoted(bytes: impl AsRef<[u8]>) -> String {
