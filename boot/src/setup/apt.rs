@@ -346,6 +346,12 @@ impl<'a> Apt<'a> {
             .env("LC_ALL", "C")
             .args(["-q", "-o", "APT::Sandbox::User=root", "-c"])
             .arg(folder.join("apt.conf"));
+        if !self.own_lists {
+            // As root apt-get would rewrite its own index of the system's lists.
+            for index in ["pkgcache", "srcpkgcache"] {
+                command.args(["-o", &format!("Dir::Cache::{index}=")]);
+            }
+        }
         let mut place = |option: &str, name: &str| {
             let place = format!("{option}={}", folder.join(name).display());
             command.args(["-o", &place]);
