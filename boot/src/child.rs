@@ -182,7 +182,7 @@ fn read_lines(
             let text = String::from_utf8_lossy(&bytes);
             let text = match stream {
                 Stream::Out => text,
-                // Words for people: a program that was told to colour them does so into pipes, too.
+                // A program that is set to colour its messages does so into pipes, too.
                 Stream::Err => strip_ansi_codes(&text).into_owned().into(),
             };
             if send.send((stream, text.into_owned())).is_err() {

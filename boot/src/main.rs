@@ -162,7 +162,7 @@ enum Subcommands {
     /// Tell what is set up, where, and what is missing; install nothing
     #[command(after_help = DOCTOR_HELP)]
     Doctor,
-    /// Print the path of the QEMU that a run uses, and get one first where there is none
+    /// Print the path of the QEMU that a run uses; get one first if none is found
     #[command(after_help = QEMU_HELP)]
     Qemu {
         /// Use this Debian suite's QEMU, and unpack it into the cache folder where it is not there

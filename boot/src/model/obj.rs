@@ -44,7 +44,7 @@ const SKIPPED: [&[u8]; 6] = [b"g", b"mtllib", b"o", b"s", b"usemtl", b"vn"];
 const KEYWORDS: [&[u8]; 13] = [
     b"f", b"fo", b"g", b"l", b"mtllib", b"o", b"p", b"s", b"usemtl", b"v", b"vn", b"vp", b"vt",
 ];
-/// How many kinds of statements that are left out are told apart.
+/// How many kinds of left-out statements the message names.
 const KINDS: usize = 6;
 
 /// What an OBJ file has of polygons.

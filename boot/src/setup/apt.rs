@@ -372,7 +372,7 @@ impl<'a> Apt<'a> {
     /// The packages that are wanted, as far as this system does not have them.
     fn list(&self, cache: &Locked, wanted: &Wanted) -> anyhow::Result<Vec<Package>> {
         let alone = wanted.alone.iter().copied().map(str::to_owned);
-        // By itself: a package with a version in its name is not found at all when the version is another.
+        // Asked for alone: apt-get finds nothing at all if one name holds a version that the archive lacks.
         if let Some(first) = wanted.alone.first() {
             let first = [(*first).to_owned()];
             self.uris(cache, &first)?
