@@ -727,6 +727,10 @@ fn read_control(stream: UnixStream, send: Sender<Event>) {
     });
 }
 
+/// How long bytes gather on the serial line before they are read. QEMU sends each byte in a call of its own,
+/// 100 000 a second; a thread that is woken for each of them takes a core to itself.
+const GATHERING: Duration = Duration::from_micros(250);
+
 /// Reads the serial line into its log and into lines.
 ///
 /// Before the kernel's first line the firmware may have said anything; after it, every line has
@@ -753,8 +757,12 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event
                     Err(_) if !greeted => continue,
                     Err(why) => Event::Garbled(why),
                 };
-                let _ = send.send(event);
+                // Without a machine nobody reads on, and a flood would keep this thread busy for ever.
+                if send.send(event).is_err() {
+                    return;
+                }
             }
+            thread::sleep(GATHERING);
         }
         let _ = send.send(Event::SerialClosed);
     });
