@@ -383,7 +383,7 @@ fn a_pause_is_not_waited_for_without_end() {
 #[test]
 fn a_stop_in_the_boot_loader_names_what_was_found() {
     let soon = Duration::from_secs(5);
-    for (vga, arguments, boot, resets, words) in [
+    let cases = [
         ("none", "", soon, false, &["display adapter"][..]),
         (
             "none",
@@ -406,7 +406,8 @@ fn a_stop_in_the_boot_loader_names_what_was_found() {
             true,
             &["no long mode"],
         ),
-    ] {
+    ];
+    let check = |(vga, arguments, boot, resets, words): (&str, &str, _, _, &[&str])| {
         let mut config = config();
         config.vga = vga.into();
         config.arguments = arguments.split_whitespace().map(Into::into).collect();
@@ -420,7 +421,13 @@ fn a_stop_in_the_boot_loader_names_what_was_found() {
         for word in words {
             assert!(said.contains(word), "{vga} {arguments}: {said}");
         }
-    }
+    };
+    // Side by side, because most of the time passes waiting.
+    std::thread::scope(|scope| {
+        for case in cases {
+            scope.spawn(move || check(case));
+        }
+    });
 }
 
 #[test]
