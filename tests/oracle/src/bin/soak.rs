@@ -33,6 +33,9 @@ struct Arguments {
     only: String,
 }
 
+/// How often to say how far it is.
+const REPORT: Duration = Duration::from_secs(30);
+
 /// Targets whose tests need QEMU: each takes seconds or more.
 const NEED_QEMU: [&str; 1] = ["qemu"];
 
@@ -79,25 +82,38 @@ fn soak(arguments: &Arguments) -> Result<bool, String> {
     }
     targets.retain(|target| !target.tests.is_empty());
     let mut rounds = 1;
+    let mut reported = start;
     while start.elapsed() < time && arguments.rounds.is_none_or(|most| rounds < most) {
         for target in &mut targets {
             target.round(arguments, false)?;
         }
         rounds += 1;
+        if reported.elapsed() >= REPORT {
+            reported = Instant::now();
+            let minutes = start.elapsed().as_secs_f64() / 60.0;
+            let failures = sum(&targets).failures;
+            eprintln!("round {rounds} after {minutes:.1} minutes: {failures} failed");
+        }
     }
-    let mut sum = Count::default();
     for target in &targets {
         for (test, count) in &target.tests {
             let Count { runs, failures } = count;
             println!("{runs:6} runs {failures:3} failed  {}: {test}", target.name);
-            sum.runs += runs;
-            sum.failures += failures;
         }
     }
     let minutes = start.elapsed().as_secs_f64() / 60.0;
-    let Count { runs, failures } = sum;
+    let Count { runs, failures } = sum(&targets);
     println!("{rounds} rounds in {minutes:.1} minutes: {failures} of {runs} runs failed");
     Ok(failures == 0)
+}
+
+/// The runs and failures of all targets.
+fn sum(targets: &[Target]) -> Count {
+    let counts = targets.iter().flat_map(|target| target.tests.values());
+    counts.fold(Count::default(), |sum, count| Count {
+        runs: sum.runs + count.runs,
+        failures: sum.failures + count.failures,
+    })
 }
 
 impl Target {
