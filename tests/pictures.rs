@@ -216,16 +216,16 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     let mut far = Compared::default();
     let mut goldens = golden::find(&golden::folder()).unwrap();
     goldens.retain(|golden| scene(golden).name == "ball");
-    for golden in &goldens {
+    for golden in goldens.iter().take(seeded::cases(goldens.len())) {
         far += compare(&ball, &pose(golden));
     }
-    for _ in 0..100 {
+    for _ in 0..seeded::cases(100) {
         let furthest = 1 << random.u32(18..24);
         let distance = random.i32(66_000..furthest);
         far += compare(&ball, &solid::pose(&mut random, distance));
     }
     let mut near = Compared::default();
-    for _ in 0..60 {
+    for _ in 0..seeded::cases(60) {
         // Within an eighth of a unit above or below a vertex, half of them nearer than the near plane.
         let reach = random.choice([128, 1 << 13]).unwrap();
         let vertex = ball.vertices[random.usize(..ball.vertices.len())];
@@ -249,8 +249,14 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
              the near plane cut {by_near} faces that are seen, the guard band {by_guard}; \
              {cut_away} pixels cut away"
         );
-        assert!(*changed > 50, "only {changed} of {pixels} changed sides");
+        assert!(
+            !seeded::is_whole() || *changed > 50,
+            "only {changed} of {pixels} changed sides"
+        );
     }
     let by_near = near.cut[0];
-    assert!(by_near > 20 && near.cut_away > 10_000, "{near:?}");
+    assert!(
+        !seeded::is_whole() || by_near > 20 && near.cut_away > 10_000,
+        "{near:?}"
+    );
 }

@@ -5,12 +5,16 @@ use oracle::solid::pose;
 use scene::Storage;
 use texmap::{Mapper, Order};
 
-/// At every pixel the nearest face, written once, in `poses` poses by each of some mappers.
+/// At every pixel the nearest face, written once, in `poses` poses by each of some mappers. A limit on
+/// the cases limits the solids as well, to any of them.
 fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
     let poses = seeded::cases(poses);
     let mut random = seeded::generator();
     let mut storage = in_place::boxed!(Storage);
-    for (name, solid, distances) in models(&mut random) {
+    let mut models = models(&mut random);
+    random.shuffle(&mut models);
+    let solids = seeded::cases(models.len());
+    for (name, solid, distances) in models.into_iter().take(solids) {
         let (mut pixels, mut contested, mut ties, mut borders) = (0, 0, 0, 0);
         for &(mapper, order) in mappers.iter().cycle().take(poses * mappers.len()) {
             let distance = random.i32(distances.clone());
