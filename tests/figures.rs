@@ -1,4 +1,4 @@
-//! The README's figures: `cargo figures`.
+//! The figures of `docs/figures.md`: `cargo figures`.
 
 use std::time::{Duration, Instant};
 

@@ -189,15 +189,18 @@ fn a_full_log_is_told_and_steers_on() {
     done(&mut show, "show at 1028", 1028);
 }
 
-/// The table of the README is the key map.
+/// The table in `docs/steering.md` lists the key map.
 #[test]
-fn the_readme_has_every_key() {
-    let readme = include_str!("../../../README.md");
+fn the_documentation_lists_every_key() {
+    let page = include_str!("../../../docs/steering.md");
     let rows = KEYS
         .iter()
         .map(|key| format!("| {} | `{}` | {} |\n", key.name, key.action, key.about));
     let table: String = rows.collect();
-    assert!(readme.contains(&table), "the README should have\n{table}");
+    assert!(
+        page.contains(&table),
+        "docs/steering.md should have this table:\n{table}"
+    );
 }
 
 #[test]
