@@ -1,0 +1,66 @@
+//! A whole session as text: every kind of command, and frames of the running show by their checksums.
+//!
+//! `transcript.txt` is what a person at the serial line would see, without the checksums of lines. Each
+//! line is cheap to read and hard to get wrong, so this one test notices a change in any answer, in the
+//! overlay and in the split view. After a change that is meant, look at the difference, and run
+//! `UPDATE_EXPECT=1 cargo test -p show --test transcript`.
+
+mod asked;
+
+use std::fmt::Write;
+
+use asked::{ask, memory};
+use emulator::Vga;
+use expect_test::expect_file;
+use link::Reception;
+use show::Show;
+
+/// What happens in the session. `tick N` shows the running show's frame of a tick, if that is due;
+/// `took N` says how many microseconds it took; `key` sends scan codes; everything else is a command.
+const SESSION: &str = include_str!("session.txt");
+
+#[test]
+fn a_session_gives_the_transcript() {
+    let mut memory = memory();
+    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
+    let (mut transcript, mut tick) = (String::new(), 0);
+    for line in SESSION.lines() {
+        writeln!(transcript, "> {line}").unwrap();
+        let (word, rest) = line.split_once(' ').unwrap_or((line, ""));
+        match word {
+            "#" => {}
+            "tick" => {
+                tick = rest.parse().unwrap();
+                if show.is_due(tick) {
+                    let mut said = |line: std::fmt::Arguments<'_>| {
+                        writeln!(transcript, "{line}").unwrap();
+                    };
+                    show.present(tick, &mut said);
+                } else {
+                    writeln!(transcript, "(not due)").unwrap();
+                }
+                assert_eq!(show.bus().take_faults(), [], "{line}");
+            }
+            "took" => show.took(rest.parse().unwrap()),
+            "key" => {
+                for code in rest.split(' ') {
+                    show.key(u8::from_str_radix(code, 16).unwrap(), tick);
+                }
+            }
+            "lose" => {
+                show.set_lost_keys(3);
+                show.set_reception(Reception {
+                    overruns: 1,
+                    damaged: 2,
+                    full: 4,
+                });
+            }
+            _ => {
+                for answer in ask(&mut show, line, tick) {
+                    writeln!(transcript, "{answer}").unwrap();
+                }
+            }
+        }
+    }
+    expect_file!["transcript.txt"].assert_eq(&transcript);
+}
