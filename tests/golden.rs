@@ -14,9 +14,9 @@ use crystal_ball::diff::Subject;
 use crystal_ball::golden::{self, Findings, Golden, Transfer};
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::setup::Ready;
-use emulator::Access;
 use link::{Command, Content, Picture};
 use tempfile::TempDir;
+use vga::Access;
 
 use crate::ready::{READY, config};
 

@@ -27,13 +27,13 @@ struct Mutant {
     to: &'static str,
 }
 
-const ATTRIBUTE: &str = "tests/emulator/src/attribute.rs";
-const CRTC: &str = "tests/emulator/src/crtc.rs";
-const DAC: &str = "tests/emulator/src/dac.rs";
-const MEMORY: &str = "tests/emulator/src/memory.rs";
-const MONITOR: &str = "tests/emulator/src/monitor.rs";
-const SCANOUT: &str = "tests/emulator/src/scanout.rs";
-const SEQUENCER: &str = "tests/emulator/src/sequencer.rs";
+const ATTRIBUTE: &str = "boot/vga/src/attribute.rs";
+const CRTC: &str = "boot/vga/src/crtc.rs";
+const DAC: &str = "boot/vga/src/dac.rs";
+const MEMORY: &str = "boot/vga/src/memory.rs";
+const MONITOR: &str = "boot/vga/src/monitor.rs";
+const SCANOUT: &str = "boot/vga/src/scanout.rs";
+const SEQUENCER: &str = "boot/vga/src/sequencer.rs";
 const ADAPTIVE: &str = "kernel/texmap/src/adaptive.rs";
 const BOUNDS: &str = "kernel/texmap/src/bounds.rs";
 const COVERAGE: &str = "kernel/texmap/src/coverage.rs";
@@ -42,12 +42,12 @@ const PLACES: &str = "kernel/texmap/src/places.rs";
 const RUNS: &str = "kernel/texmap/src/runs.rs";
 const VISIBLE: &str = "kernel/texmap/src/visible.rs";
 const WITHIN: &str = "kernel/texmap/src/within.rs";
-const VGA: &str = "tests/emulator/src/vga.rs";
+const VGA: &str = "boot/vga/src/vga.rs";
 const DRIVER: &str = "kernel/modex/src/driver.rs";
 const REGISTERS: &str = "kernel/modex/src/registers.rs";
 
 /// The crates whose tests must kill a mutant of the driver or of the card.
-const CARD: [&str; 2] = ["--package=emulator", "--package=modex"];
+const CARD: [&str; 2] = ["--package=vga", "--package=modex"];
 /// The crates whose tests must kill a mutant of coverage or of a mapper.
 const MAPPER: [&str; 2] = ["--package=texmap", "--package=oracle"];
 /// Those whose tests must kill a mutant of what is seen.

@@ -7,13 +7,13 @@
 //! its geometry comes from its registers.
 
 use anyhow::{Context, anyhow, bail};
-use emulator::Vga;
 use in_place::InPlace;
 use link::dump::{Header, PLANE_BYTES};
 use link::{Command, Content, ERROR, Motion, OK, Picture, Word};
 use pack::Pack;
 use scene::catalogue::Entry;
 use show::{Memory, Show};
+use vga::Vga;
 
 use crate::dump::Dump;
 use crate::indexed::widen;

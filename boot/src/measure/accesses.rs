@@ -6,10 +6,10 @@
 
 use anyhow::{bail, ensure};
 use cost::{Ask, Bench, Clock, Memory, Work};
-use emulator::Vga;
 use in_place::InPlace;
 use modex::{Bus, Counted, Tally};
 use texmap::{Mapper, Order};
+use vga::Vga;
 
 /// What a picture of the ball does to the card.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

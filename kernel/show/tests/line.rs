@@ -3,11 +3,11 @@
 mod asked;
 
 use asked::{ask, done, memory};
-use emulator::Vga;
 use link::Reception;
 use modex::Purpose;
 use modex::registers::MISC_WRITE;
 use show::Show;
+use vga::Vga;
 
 /// Times that the card's mode was set.
 fn mode_sets(show: &mut Show<'_, Vga>) -> u64 {

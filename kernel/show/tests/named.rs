@@ -4,12 +4,12 @@
 mod asked;
 
 use asked::{ask, done, memory};
-use emulator::Vga;
 use fastrand::Rng;
 use link::Action;
 use scene::catalogue::CATALOGUE;
 use show::Show;
 use texmap::{Mapper, Order};
+use vga::Vga;
 
 /// Commands of a sequence, and how many of them the twin repeats after `hold`.
 const COMMANDS: usize = 60;

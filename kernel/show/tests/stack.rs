@@ -5,8 +5,8 @@ mod asked;
 use std::thread;
 
 use asked::done;
-use emulator::Vga;
 use show::Show;
+use vga::Vga;
 
 /// A quarter of what a thread has by default.
 const STACK: usize = 512 << 10;

@@ -3,9 +3,9 @@
 mod asked;
 
 use asked::{ask, done};
-use emulator::Vga;
 use link::Action;
 use show::{KEYS, Show};
+use vga::Vga;
 
 /// What is shown: the bytes' checksums, and what they are the picture of.
 fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {

@@ -10,10 +10,10 @@ mod asked;
 use std::fmt::Write;
 
 use asked::{ask, memory};
-use emulator::Vga;
 use expect_test::expect_file;
 use link::Reception;
 use show::Show;
+use vga::Vga;
 
 /// What happens in the session. `tick N` shows the running show's frame of a tick, if that is due;
 /// `took N` says how many microseconds it took; `key` sends scan codes; everything else is a command.

@@ -1,9 +1,9 @@
 //! A show on the emulated card, asked on its serial line.
 
-use emulator::Vga;
 use in_place::InPlace;
 use link::write_line;
 use show::{Memory, Show};
+use vga::Vga;
 
 /// The lines of a command's answer.
 pub fn ask(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
@@ -18,6 +18,7 @@ pub fn ask(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
 }
 
 /// The answer of a command that is carried out, without its end.
+#[allow(dead_code, reason = "not every file of tests needs it")]
 pub fn done(show: &mut Show<'_, Vga>, line: &str, tick: u32) -> Vec<String> {
     let mut answer = ask(show, line, tick);
     assert_eq!(answer.pop().unwrap(), format!("ok {line}"), "{answer:?}");

@@ -1,10 +1,10 @@
 //! Faces to map, and whether what is drawn of them is what the jobs say.
 
-use emulator::Vga;
 use modex::{Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Tally};
 use texmap::coverage::{self, Axis};
 use texmap::plane::Anchor;
 use texmap::{Face, Job, JobList, Mapper, Order, Renderer, Stats, Texture, Vertex};
+use vga::Vga;
 
 pub const FOCAL_LENGTH: i32 = 258;
 const BACKGROUND: [u8; HEIGHT] = [0; HEIGHT];

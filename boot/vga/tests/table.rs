@@ -1,8 +1,8 @@
 //! The driver's register table against the card's own values: no bit of the table can be wrong.
 
-use emulator::{Access, Vga};
 use modex::registers::*;
 use modex::{Bus, Lane, ModeX};
+use vga::{Access, Vga};
 
 /// A card behind a driver whose table has one wrong bit: what the driver writes as the table's value
 /// arrives with that bit changed, and is changed back when it is read.

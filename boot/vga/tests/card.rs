@@ -1,8 +1,8 @@
 //! What the card does with accesses that are well.
 
-use emulator::{Access, Latch, Vga};
 use modex::registers::*;
 use modex::{Bus, HEIGHT, ModeX, Purpose, STRIDE, WIDTH};
+use vga::{Access, Latch, Vga};
 
 /// A colour for each entry, no two alike.
 fn palette() -> [[u8; 3]; 256] {

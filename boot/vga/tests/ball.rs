@@ -1,9 +1,9 @@
 //! The ball on the emulated card: driver and renderer as they run on the bare machine.
 
-use emulator::Vga;
 use modex::registers::{CRTC, MAP_MASK, MODE_X, SEQUENCER, START_ADDRESS_HIGH};
 use modex::{Counted, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Purpose, WIDTH};
 use scene::{Pose, Stage, Storage};
+use vga::Vga;
 
 #[test]
 fn every_picture_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {

@@ -1,8 +1,8 @@
 //! Every fault, caused by an access that would blank, garble or be dropped on a card.
 
-use emulator::Vga;
 use modex::registers::*;
 use modex::{Bus, Destination, HEIGHT, ModeX, Purpose, STRIDE};
+use vga::Vga;
 
 const BLACK: [[u8; 3]; 256] = [[0; 3]; 256];
 

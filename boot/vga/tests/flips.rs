@@ -5,9 +5,9 @@
 use std::cell::Cell;
 use std::rc::Rc;
 
-use emulator::{Latch, Vga};
 use modex::registers::*;
 use modex::{Bus, Destination, HEIGHT, ModeX, Purpose, STRIDE};
+use vga::{Latch, Vga};
 
 const BLACK: [[u8; 3]; 256] = [[0; 3]; 256];
 const LATCHES: [Latch; 3] = [Latch::DisplayEnd, Latch::RetraceStart, Latch::DisplayStart];
