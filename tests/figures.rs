@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::golden::{self, Findings, Golden, Transfer};
 use crystal_ball::machine::{Config, Machine};
-use crystal_ball::setup::{self, Options};
 use link::{Command, Content, Picture};
+use setup::Options;
 
 use crate::ready;
 

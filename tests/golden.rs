@@ -13,8 +13,8 @@ use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::diff::Subject;
 use crystal_ball::golden::{self, Findings, Golden, Transfer};
 use crystal_ball::machine::{Config, Machine};
-use crystal_ball::setup::Ready;
 use link::{Command, Content, Picture};
+use setup::Ready;
 use tempfile::TempDir;
 use vga::Access;
 

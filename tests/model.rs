@@ -6,8 +6,8 @@ use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::machine::{Config, Machine};
 use crystal_ball::model::Model;
 use crystal_ball::screen::Screen;
-use crystal_ball::setup::Options;
 use link::{Command, Content, Picture, Setting, Word};
+use setup::Options;
 use tempfile::TempDir;
 
 use crate::ready;

@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crystal_ball::child;
 use rustix::process::{Pid, Signal, kill_process_group};
+use system::child;
 use tempfile::TempDir;
 
 /// A mistake to plant: in `file`, `from` becomes `to`.

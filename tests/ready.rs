@@ -4,7 +4,7 @@ use std::io::Write;
 use std::sync::LazyLock;
 
 use crystal_ball::machine::Config;
-use crystal_ball::setup::{self, Options, Ready};
+use setup::{Options, Ready};
 
 /// What every boot needs.
 pub static READY: LazyLock<Ready> = LazyLock::new(|| with(&Options::default()));

@@ -16,8 +16,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use crystal_ball::child::{self, Interrupted};
-use crystal_ball::setup::{self, Options};
+use setup::Options;
+use system::Interrupted;
 use tempfile::TempDir;
 
 /// Names what the process of [`in_a_world`] shall do.
@@ -284,7 +284,7 @@ impl Said {
 #[ignore = "started by the other tests"]
 fn in_a_world() {
     let Ok(what) = env::var(DO) else { return };
-    child::catch_interrupts();
+    system::catch_interrupts();
     let options = Options {
         toolchain: env::var_os("TEST_TOOLCHAIN").map(Into::into),
         window: what == "window",

@@ -9,7 +9,7 @@ use std::thread;
 
 use anyhow::{Context, bail, ensure};
 use crystal_ball::machine::Failure;
-use crystal_ball::setup::{Options, Ready};
+use setup::{Options, Ready};
 
 use crate::golden::{agrees, emulated_evidence, evidence, few, goldens, with_arguments};
 use crate::ready;

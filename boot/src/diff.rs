@@ -17,12 +17,12 @@ use link::Content;
 use link::dump::{MAGIC, OrNone, PLANE_BYTES};
 use modex::Rgb6;
 
-use crate::child;
 use crate::dump::Dump;
 use crate::indexed::Indexed;
-use crate::quote;
 use crate::report::Report;
-use crate::setup::say;
+use system::quote;
+use system::say;
+use system::{Interrupted, interrupted};
 
 /// How every PNG begins.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -664,8 +664,8 @@ impl<W: Write> Findings<'_, W> {
         }
         let [in_a, in_b] = &names;
         for name in in_a | in_b {
-            if child::interrupted() {
-                return Err(child::Interrupted.into());
+            if interrupted() {
+                return Err(Interrupted.into());
             }
             let shown = quote::path(name.as_ref());
             let lacks = match (in_a.contains(&name), in_b.contains(&name)) {

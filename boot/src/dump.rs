@@ -12,7 +12,7 @@ use link::{Content, Lines, Motion, Picture, Word};
 use modex::Palette;
 
 use crate::indexed::Indexed;
-use crate::quote::quoted;
+use system::quote::quoted;
 
 /// What a card held: its palette and the pixels of a page, or of all video memory.
 #[derive(Clone, PartialEq, Eq)]

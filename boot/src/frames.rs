@@ -12,8 +12,8 @@ use link::{Command, Content, Motion, Picture};
 
 use crate::card::Card;
 use crate::look::Look;
-use crate::setup::Step;
-use crate::{aside, child};
+use system::Step;
+use system::{Interrupted, interrupted, write_atomically};
 
 /// Which pictures, how much of the card, and where to.
 #[derive(Args, Clone, Debug)]
@@ -137,8 +137,8 @@ impl Frames {
         let what = format_args!("dumping into {}", self.out.display());
         let mut step = Step::counting(what, count);
         for (done, picture) in (1..).zip(pictures) {
-            if child::interrupted() {
-                return Err(child::Interrupted.into());
+            if interrupted() {
+                return Err(Interrupted.into());
             }
             card.show_as(look, &[])?;
             card.ask(match motion {
@@ -148,9 +148,9 @@ impl Frames {
             let dump = card.dump(content)?;
             let stem = self.out.join(stem(picture, motion, content));
             let text = stem.with_added_extension("dump");
-            aside::write(&text, |file| Ok(dump.write(std::io::BufWriter::new(file))?))?;
+            write_atomically(&text, |file| Ok(dump.write(std::io::BufWriter::new(file))?))?;
             let png = stem.with_added_extension("png");
-            aside::write(&png, |file| dump.picture().write_png(file))?;
+            write_atomically(&png, |file| dump.picture().write_png(file))?;
             step.at(done);
             wrote(&text)?;
             wrote(&png)?;

@@ -39,16 +39,16 @@ use scene::catalogue::Entry;
 use serde::Deserialize;
 use texmap::{Mapper, Order};
 
-use crate::aside;
 use crate::card::{self, Card, Emulated};
 use crate::diff::{Difference, Subject, compare};
 use crate::indexed::Indexed;
 use crate::look::{Look, Named};
 use crate::machine::Machine;
-use crate::quote::{printable, quoted};
 use crate::report::Report;
 use crate::screen::Screen;
-use crate::setup::Step;
+use system::Step;
+use system::quote::{printable, quoted};
+use system::write_atomically;
 
 /// A golden frame.
 #[derive(Clone, Debug)]
@@ -78,7 +78,7 @@ struct Description {
 
 /// The workspace's golden frames.
 pub fn folder() -> PathBuf {
-    crate::setup::root().join("tests").join("golden")
+    setup::root().join("tests").join("golden")
 }
 
 /// The goldens of a folder by name.
@@ -478,7 +478,7 @@ pub fn bless(
         .verdict(&report.with_file_name("disagreement").join("report.html"))
         .context("QEMU does not agree, so nothing was blessed")?;
     for (golden, picture) in &changes {
-        aside::write(&golden.png, |file| picture.write_png(file))?;
+        write_atomically(&golden.png, |file| picture.write_png(file))?;
     }
     Ok(changes.len())
 }

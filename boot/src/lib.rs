@@ -1,8 +1,6 @@
 //! The host program of Crystal Ball: set-up, disk image, QEMU and its verdict.
 
-pub mod aside;
 pub mod card;
-pub mod child;
 pub mod diff;
 pub mod dump;
 pub mod frames;
@@ -12,11 +10,9 @@ pub mod look;
 pub mod machine;
 pub mod measure;
 pub mod model;
-pub mod quote;
 pub mod record;
 pub mod replay;
 pub mod report;
 pub mod screen;
-pub mod setup;
 pub mod trade;
 pub mod window;

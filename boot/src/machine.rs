@@ -41,11 +41,11 @@ use verdict::Evidence;
 pub use verdict::{Failure, Found, Verdict};
 
 use crate::card::Card;
-use crate::child;
 use crate::dump::Dump;
-use crate::quote::quoted;
 use crate::screen::Screen;
-use crate::setup::Ready;
+use setup::Ready;
+use system::quote::quoted;
+use system::{Interrupted, interrupted};
 
 /// How often a running show is asked for a sign of life.
 const HEARTBEAT: Duration = Duration::from_secs(5);
@@ -499,8 +499,8 @@ impl Machine {
     /// A [`Failure`] as soon as one is certain.
     fn pump(&mut self, by: Instant) -> anyhow::Result<bool> {
         let event = loop {
-            if child::interrupted() {
-                return Err(child::Interrupted.into());
+            if interrupted() {
+                return Err(Interrupted.into());
             }
             if self.ending.as_mut().is_some_and(Patience::is_over) {
                 self.end();

@@ -16,11 +16,12 @@ use crystal_ball::golden;
 use crystal_ball::look::{Look, Named};
 use crystal_ball::machine::{Config, Failure, Machine, Printed, Verdict};
 use crystal_ball::model::{Files, Model};
-use crystal_ball::quote::printable;
-use crystal_ball::setup::{self, Options, Ready, say};
-use crystal_ball::{aside, child, quote, record, replay, trade, window};
+use crystal_ball::{record, replay, trade, window};
 use link::{Action, Change, Command};
 use scene::catalogue::Entry;
+use setup::{Options, Ready};
+use system::quote::printable;
+use system::{Interrupted, quote, say, write_atomically};
 
 /// How long the ball turns before its picture is taken without a display.
 const WARM_UP: Duration = Duration::from_secs(1);
@@ -272,7 +273,7 @@ fn main() -> ExitCode {
         let message = format!("{option} needs your own model: add --model FILE.obj");
         Cli::command().error(kind, message).exit();
     }
-    child::catch_interrupts();
+    system::catch_interrupts();
     match run(cli) {
         Ok(code) => code,
         Err(error) if error.is::<Printed>() => {
@@ -287,9 +288,9 @@ fn main() -> ExitCode {
                     message = failure.to_string();
                 }
                 failure.verdict.exit_code()
-            } else if let Some(interrupted) = error.downcast_ref::<child::Interrupted>() {
+            } else if let Some(interrupted) = error.downcast_ref::<Interrupted>() {
                 message = interrupted.to_string();
-                child::Interrupted::EXIT_CODE as u8
+                Interrupted::EXIT_CODE as u8
             } else {
                 1
             };
@@ -554,7 +555,7 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
     machine.rest(WARM_UP)?;
     let picture = setup::folder().join(name);
     let screen = machine.screen()?;
-    aside::write(&picture, |file| screen.write_png(file))?;
+    write_atomically(&picture, |file| screen.write_png(file))?;
     machine.leave()?;
     say("a picture of the running show:");
     writeln!(Output, "{}", picture.display())?;
@@ -564,7 +565,7 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
 /// Here 1 means that something differs: an error is 2, as for `diff` and `cmp`.
 fn compare(a: &Path, b: &Path, report: Option<&Path>) -> anyhow::Result<ExitCode> {
     let outcome = match diff::run(a, b, report, &mut Output) {
-        Err(error) if !error.is::<child::Interrupted>() => {
+        Err(error) if !error.is::<Interrupted>() => {
             say(format_args!("error: {error:#}"));
             diff::Outcome::Incomparable
         }
@@ -575,7 +576,7 @@ fn compare(a: &Path, b: &Path, report: Option<&Path>) -> anyhow::Result<ExitCode
 
 fn write_image(image: &Path, out: &Path) -> anyhow::Result<()> {
     let mut from = File::open(image).with_context(|| format!("{} is gone", image.display()))?;
-    let bytes = aside::write(out, |file| Ok(io::copy(&mut from, file)?))?;
+    let bytes = write_atomically(out, |file| Ok(io::copy(&mut from, file)?))?;
     say(format_args!(
         "{}: {bytes} bytes; boots on a PC BIOS with a VGA",
         out.display()

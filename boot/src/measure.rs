@@ -15,7 +15,8 @@ use link::OK;
 use texmap::{Mapper, Order};
 
 use crate::machine::{self, Machine};
-use crate::setup::{self, Options, Ready, Step};
+use setup::{Options, Ready};
+use system::Step;
 
 mod accesses;
 

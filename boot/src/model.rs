@@ -33,7 +33,7 @@ use mesh::{Polygons, Solid, Tally, Turned};
 use obj::{BadLine, Obj};
 use texture::{Layout, Picture};
 
-use crate::quote;
+use system::quote;
 
 /// Most bytes of an OBJ: far more than a model of [`scene::MAX_FACES`] faces has.
 const MAX_BYTES: u64 = 64 << 20;
@@ -95,7 +95,7 @@ impl Model {
     /// Makes a model of an OBJ, and of a PNG for a texture; without one it gets a pattern.
     ///
     /// # Errors
-    /// As [`Files::load`]. [`Interrupted`](crate::child::Interrupted) as soon as the user asks to
+    /// As [`Files::load`]. [`Interrupted`](system::Interrupted) as soon as the user asks to
     /// stop.
     pub fn load(obj: &Path, png: Option<&Path>) -> anyhow::Result<Self> {
         let (obj, png) = (obj.to_owned(), png.map(Path::to_owned));

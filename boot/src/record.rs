@@ -21,8 +21,8 @@ use crate::frames::range;
 use crate::indexed::{Indexed, widen};
 use crate::look::Look;
 use crate::machine::Machine;
-use crate::setup::Step;
-use crate::{aside, child};
+use system::Step;
+use system::{Interrupted, interrupted, write_atomically};
 
 /// Which frames, and where to.
 #[derive(Args, Clone, Debug)]
@@ -92,15 +92,15 @@ impl Options {
         machine.show_as(look, &[])?;
         emulated.show_as(look, &[])?;
         let mut pictures = (1..).zip(frames).map(|(done, frame)| {
-            if child::interrupted() {
-                return Err(child::Interrupted.into());
+            if interrupted() {
+                return Err(Interrupted.into());
             }
             let picture = seen(machine, emulated, Picture::Frame(frame))?;
             step.at(done);
             Ok((frame, picture))
         });
         if self.is_gif()? {
-            aside::write(&self.out, |file| self.write_gif(file, pictures))?;
+            write_atomically(&self.out, |file| self.write_gif(file, pictures))?;
             return Ok(wrote(&self.out)?);
         }
         std::fs::create_dir_all(&self.out)
@@ -108,7 +108,7 @@ impl Options {
         pictures.try_for_each(|recorded| {
             let (frame, picture) = recorded?;
             let png = self.out.join(format!("frame-{frame:06}.png"));
-            aside::write(&png, |file| picture.write_png(file))?;
+            write_atomically(&png, |file| picture.write_png(file))?;
             Ok(wrote(&png)?)
         })
     }

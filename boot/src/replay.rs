@@ -15,8 +15,8 @@ use scene::font;
 use crate::diff::{Subject, list};
 use crate::indexed::{Indexed, widen};
 use crate::screen::Screen;
-use crate::setup::Step;
-use crate::{aside, child};
+use system::Step;
+use system::{Interrupted, interrupted, write_atomically};
 
 /// Which pictures, and how they are shown.
 #[derive(Args, Clone, Debug)]
@@ -61,8 +61,8 @@ impl Options {
         let mut pictures = Vec::new();
         let mut step = Step::counting("reading", files.len() as u64);
         for (done, file) in (1..).zip(&files) {
-            if child::interrupted() {
-                return Err(child::Interrupted.into());
+            if interrupted() {
+                return Err(Interrupted.into());
             }
             pictures.push(Subject::read(file)?.picture().into_owned());
             step.at(done);
@@ -71,7 +71,7 @@ impl Options {
         match &self.sheet {
             Some(sheet) => {
                 let laid_out = lay_out(&pictures, &names(&files));
-                aside::write(sheet, |file| {
+                write_atomically(sheet, |file| {
                     laid_out.write_png(std::io::BufWriter::new(file))
                 })?;
                 Ok(wrote(sheet)?)
@@ -115,7 +115,7 @@ impl Options {
                 screen.write(&text)?;
                 due += time;
                 while Instant::now() < due {
-                    if child::interrupted() {
+                    if interrupted() {
                         return Ok(());
                     }
                     let left = due.saturating_duration_since(Instant::now());

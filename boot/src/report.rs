@@ -17,11 +17,11 @@ use anyhow::Context;
 use link::Content;
 use modex::Rgb6;
 
-use crate::aside;
 use crate::diff::{Bounds, Colour, Difference, Shape, Subject, colour, differing_entries};
 use crate::dump::Dump;
 use crate::indexed::{Indexed, widen};
 use crate::screen::Screen;
+use system::write_atomically;
 
 const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
@@ -120,7 +120,7 @@ impl Report {
             let name = names.take(&pair.name);
             let put = |ending: &str, make: Make| {
                 let path = folder.join(format!("{name}-{ending}"));
-                aside::write(&path, make)
+                write_atomically(&path, make)
             };
             pair.section(&mut page, i, &format!("{url}/{name}"), &put)?;
         }
@@ -129,7 +129,7 @@ impl Report {
             let _ = writeln!(page, "<script>\n{SCRIPT}</script>");
         }
         page += "</body>\n</html>\n";
-        aside::write(html, |file| Ok(file.write_all(page.as_bytes())?))
+        write_atomically(html, |file| Ok(file.write_all(page.as_bytes())?))
     }
 
     fn title(&self) -> String {

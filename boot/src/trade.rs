@@ -26,9 +26,9 @@ use scene::catalogue::Entry;
 use texmap::loops::Loop;
 use texmap::{Mapper, Order};
 
-use crate::aside;
 use crate::measure::{self, Measured};
-use crate::setup::{self, Step};
+use system::Step;
+use system::write_atomically;
 
 pub mod accuracy;
 pub mod clock;
@@ -131,7 +131,7 @@ pub fn run(
     let model = model.map(|pack| pack.entry(&mut arena));
     let out = match &options.out {
         Some(out) => out.clone(),
-        None => crate::setup::folder().join("trade"),
+        None => setup::folder().join("trade"),
     };
     let chosen = |all: &[String], name: &str| all.is_empty() || all.iter().any(|one| one == name);
     let named = Mapper::ALL.iter();
@@ -305,7 +305,7 @@ impl Found {
     /// Writes all files; the page last, so that what it names is there.
     fn write(&self, out: &Path, about: &[String]) -> anyhow::Result<()> {
         let put = |name: &str, text: &str| {
-            aside::write(&out.join(name), |file| Ok(file.write_all(text.as_bytes())?))
+            write_atomically(&out.join(name), |file| Ok(file.write_all(text.as_bytes())?))
         };
         let all = Table::all(&self.tables);
         let several = self.tables.len() > 1;
@@ -363,8 +363,8 @@ impl Found {
         for gallery in &self.galleries {
             for shown in &gallery.shown {
                 let path = |map| out.join(folder).join(gallery.file(shown, map));
-                aside::write(&path(false), |file| shown.picture.write_png(file))?;
-                aside::write(&path(true), |file| shown.heat.write_png(file))?;
+                write_atomically(&path(false), |file| shown.picture.write_png(file))?;
+                write_atomically(&path(true), |file| shown.heat.write_png(file))?;
             }
         }
         let plots: Vec<_> = plots

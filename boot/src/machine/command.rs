@@ -16,7 +16,7 @@ use rustix::process::Pid;
 
 use super::Config;
 use super::run::Event;
-use crate::child;
+use system::child;
 
 /// QEMU's ends of the sockets, as its command line names them.
 const CONTROL: i32 = 3;

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
 
-use crate::child::{Interrupted, interrupted};
+use system::{Interrupted, interrupted};
 
 /// How often the waiting thread looks up.
 const LOOK_UP: Duration = Duration::from_millis(20);

@@ -25,7 +25,7 @@ use std::fmt;
 
 use scene::MAX_VERTICES;
 
-use crate::quote::quoted;
+use system::quote::quoted;
 
 /// Largest coordinate, either sign: a model's size is squared on the way.
 const MAX_COORDINATE: f64 = 1e30;

@@ -17,7 +17,7 @@ use png::{BitDepth, ColorType, Decoder, Transformations};
 use super::kind;
 use super::mesh::Polygon;
 use super::obj::BadLine;
-use crate::quote::quoted;
+use system::quote::quoted;
 
 /// How every PNG begins.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";

@@ -1,55 +1,56 @@
-//! Every child process the project starts, tied to this program's life.
+//! Child processes that end with this program.
 //!
-//! A host program that is killed must not leave a QEMU, a download or a compiler behind. `SIGKILL`
-//! cannot be caught, so no clean-up code of ours can do that: the kernel has to. Linux does it with the
-//! parent-death signal, which a child asks for itself; std offers that only through unsafe code, so
-//! util-linux's `setpriv` asks instead, where it is installed. Without it children still die with every
-//! ordinary end of this program.
+//! A host program that is killed must not leave a QEMU, a download or a compiler behind. No clean-up code of
+//! ours can run after a `SIGKILL`, so the operating system has to end the children. Linux does so by the
+//! parent-death signal, which a child requests for itself. std offers that only through unsafe code, so
+//! util-linux's `setpriv` makes the request where it is installed. Without `setpriv`, children still end with
+//! every ordinary end of this program.
 //!
-//! **The signal is tied to the thread** that started the child, not to the process: it is sent when that
-//! thread ends. So a child is started and waited for on one and the same thread, one that lives as long as
-//! the child. [`run`] and [`watch`] keep to that by not returning before the child has ended.
+//! **The signal belongs to the thread** that started the child, not to the process: Linux sends it when that
+//! thread ends. So one thread starts the child and waits for it. [`run`] and [`watch`] return only after the
+//! child has ended.
 
 use std::ffi::OsStr;
-use std::fmt;
 use std::io::{BufRead, BufReader, Read};
 use std::os::unix::process::CommandExt;
 use std::process::{Command, Stdio};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::OnceLock;
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
-use std::sync::{Once, OnceLock};
 use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use console::strip_ansi_codes;
 use rustix::process::{Pid, Signal, kill_process_group};
 
-/// How much of a failed child's error output its error message repeats.
+use crate::{Interrupted, interrupted};
+
+/// Lines of a failed child's error output that the error message repeats.
 const TAIL_LINES: usize = 20;
 
-/// The arguments before the program's own name, in a command that goes through `setpriv`.
+/// Arguments in front of the program's name when `setpriv` starts the program.
 const TIED_ARGUMENTS: usize = 8;
 
-/// The parent may be gone before `setpriv` has asked for the signal, which then never comes: compare.
+/// Ends at once if the parent ended before `setpriv` made its request: the signal would never come.
 const ALONE: &str = r#"[ "$PPID" = "$1" ] || exit 1; shift; exec "$@""#;
 
-/// The same for a family: the shell stays, leads the process group and takes all of it with it.
+/// The same for a program that starts others: the shell stays, leads the process group, and ends all of it.
 const FAMILY: &str =
     r#"trap 'kill -KILL 0' TERM; [ "$PPID" = "$1" ] || exit 1; shift; "$@" & wait $!"#;
 
-/// A command whose process dies with this program, `SIGKILL` included.
+/// Returns a command whose process ends with this program, even by `SIGKILL`.
 ///
-/// For one long-lived process, such as QEMU: the process has the id that [`Command::spawn`] reports.
-/// Where `setpriv` is used a missing program is exit code 127, not an error of `spawn`: look it up first.
-/// See the [module](self) about threads.
+/// Use it for one long-lived process, such as QEMU. The process has the id that [`Command::spawn`] reports.
+/// With `setpriv`, a missing program gives exit code 127 and no error of `spawn`, so find the program first.
+/// The [module](self) explains the rule about threads.
 pub fn command(program: impl AsRef<OsStr>) -> Command {
     tied("KILL", ALONE, program.as_ref())
 }
 
-/// As [`command`], for a program that starts others (cargo, apt-get): all of them die.
+/// Returns a command for a program that starts others, such as cargo or apt-get: all of them end with this
+/// program.
 ///
-/// The parent-death signal is not inherited by grandchildren, so a shell receives it for the whole process
-/// group. Only for [`run`] and [`watch`], which make that group.
+/// Grandchildren do not inherit the parent-death signal, so a shell receives it for the whole process group.
+/// Only [`run`] and [`watch`] make that group.
 pub fn family(program: impl AsRef<OsStr>) -> Command {
     tied("TERM", FAMILY, program.as_ref())
 }
@@ -65,32 +66,32 @@ fn tied(signal: &str, script: &str, program: &OsStr) -> Command {
     command
 }
 
-/// What [`watch`] tells about a child that runs.
+/// What [`watch`] reports about a running child.
 #[derive(Debug, Clone, Copy)]
 pub enum Event<'a> {
     /// A line of its error output.
     Line(&'a str),
-    /// Some time has passed (a few times a second).
+    /// Time has passed; reported a few times a second.
     Tick,
 }
 
 /// Runs a command to its end and returns its output.
 ///
 /// # Errors
-/// When it cannot be started or fails (with the command line and the last lines of its error output), or
-/// [`Interrupted`] when the user stops this program: the child has then been killed.
+/// The command cannot be started, or fails: the message has the command line and the last lines of its error
+/// output. [`Interrupted`] if the user stops this program; the child has then been killed.
 pub fn run(command: &mut Command) -> anyhow::Result<String> {
     watch(command, |_| {})
 }
 
-/// As [`run`], and tells what the child writes to its error output, and that time passes.
+/// Runs a command as [`run`] does, and reports its error output by line, and the passing of time.
 ///
 /// # Errors
 /// As [`run`].
-pub fn watch(command: &mut Command, mut tell: impl FnMut(Event)) -> anyhow::Result<String> {
+pub fn watch(command: &mut Command, mut report: impl FnMut(Event)) -> anyhow::Result<String> {
     const TICK: Duration = Duration::from_millis(200);
     let line = line(command);
-    // A group of its own, so that Ctrl-C and failure can end the children's children too.
+    // With a process group of its own, Ctrl-C and failure can end the children's children as well.
     command
         .process_group(0)
         .stdin(Stdio::null())
@@ -117,15 +118,15 @@ pub fn watch(command: &mut Command, mut tell: impl FnMut(Event)) -> anyhow::Resu
         match receive.recv_timeout(TICK.saturating_sub(ticked.elapsed())) {
             Ok((Stream::Out, text)) => output.push_str(&text),
             Ok((Stream::Err, text)) => {
-                tell(Event::Line(text.trim_end()));
+                report(Event::Line(text.trim_end()));
                 errors.push(text);
             }
-            // The pipes are closed: what is left is its end.
+            // The pipes are closed; the child is about to end.
             Err(RecvTimeoutError::Disconnected) => std::thread::sleep(Duration::from_millis(1)),
             Err(RecvTimeoutError::Timeout) => {}
         }
         if interrupted() {
-            // It may have ended just now; then there is no group to kill.
+            // If the child has just ended, there is no group to kill.
             let _ = kill_process_group(Pid::from_child(&child), Signal::KILL);
             child.wait()?;
             return Err(Interrupted.into());
@@ -133,7 +134,7 @@ pub fn watch(command: &mut Command, mut tell: impl FnMut(Event)) -> anyhow::Resu
         if ended.is_none() {
             ended = child.try_wait()?.map(|status| (status, Instant::now()));
         }
-        // A background process that it left behind may hold the pipes open: it is not waited for.
+        // A background process that the child left may hold the pipes open. Do not wait for it.
         if let Some((status, since)) = ended
             && (readers.iter().flatten().all(|reader| reader.is_finished())
                 || since.elapsed() > 2 * TICK)
@@ -142,7 +143,7 @@ pub fn watch(command: &mut Command, mut tell: impl FnMut(Event)) -> anyhow::Resu
                 match stream {
                     Stream::Out => output.push_str(&text),
                     Stream::Err => {
-                        tell(Event::Line(text.trim_end()));
+                        report(Event::Line(text.trim_end()));
                         errors.push(text);
                     }
                 }
@@ -151,7 +152,7 @@ pub fn watch(command: &mut Command, mut tell: impl FnMut(Event)) -> anyhow::Resu
         }
         if ticked.elapsed() >= TICK {
             ticked = Instant::now();
-            tell(Event::Tick);
+            report(Event::Tick);
         }
     };
     if status.success() {
@@ -182,7 +183,7 @@ fn read_lines(
             let text = String::from_utf8_lossy(&bytes);
             let text = match stream {
                 Stream::Out => text,
-                // A program that is set to colour its messages does so into pipes, too.
+                // Some programs colour their messages even into a pipe.
                 Stream::Err => strip_ansi_codes(&text).into_owned().into(),
             };
             if send.send((stream, text.into_owned())).is_err() {
@@ -193,7 +194,7 @@ fn read_lines(
     })
 }
 
-/// The command line as the user would type it into a shell, without what ties it to this program.
+/// Returns the command line as a user would type it into a shell, without the part that `setpriv` needs.
 pub fn line(command: &Command) -> String {
     let own = [command.get_program()]
         .into_iter()
@@ -209,7 +210,7 @@ pub fn line(command: &Command) -> String {
         .join(" ")
 }
 
-/// A word for the shell.
+/// Returns a word, quoted for the shell where necessary.
 fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "_@%+=:,./-".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
@@ -218,45 +219,6 @@ fn quoted(word: &str) -> String {
         format!("'{}'", word.replace('\'', r"'\''"))
     }
 }
-
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
-
-/// From now on Ctrl-C, `SIGTERM` and `SIGHUP` are noted (see [`interrupted`]) instead of ending the program,
-/// so that it can remove its temporary folders. A second one ends it at once.
-pub fn catch_interrupts() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let caught = ctrlc::set_handler(|| {
-            if INTERRUPTED.swap(true, Ordering::Relaxed) {
-                std::process::exit(Interrupted::EXIT_CODE);
-            }
-        });
-        // Without the handler Ctrl-C ends the program at once; the next set-up removes what stays.
-        drop(caught);
-    });
-}
-
-/// Whether the user has asked to stop since [`catch_interrupts`].
-pub fn interrupted() -> bool {
-    INTERRUPTED.load(Ordering::Relaxed)
-}
-
-/// The error of work that was stopped by the user.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Interrupted;
-
-impl Interrupted {
-    /// What a shell reports for a program ended by Ctrl-C.
-    pub const EXIT_CODE: i32 = 130;
-}
-
-impl fmt::Display for Interrupted {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        f.write_str("interrupted")
-    }
-}
-
-impl std::error::Error for Interrupted {}
 
 #[cfg(test)]
 mod tests {
@@ -271,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn output_is_returned_and_errors_are_told_by_line() {
+    fn output_is_returned_and_errors_are_reported_by_line() {
         let mut lines = Vec::new();
         let output = watch(
             &mut shell("echo one; echo two >&2; printf three >&2; echo four"),
@@ -340,7 +302,7 @@ mod tests {
                 .stdout(Stdio::piped())
                 .spawn()
                 .unwrap();
-            // It has said something, so it has asked for the signal.
+            // Its first byte comes after the request for the signal.
             child.stdout.take().unwrap().read_exact(&mut [0]).unwrap();
             child
         };

@@ -1,4 +1,6 @@
-//! Files that the user may name: whole or not there, and nothing destroyed that is no file.
+//! Atomic writes to files that the user names.
+//!
+//! A reader sees the old file or the complete new one. Links, devices and FIFOs stay what they are.
 
 use std::fs::{self, File, OpenOptions, Permissions};
 use std::io;
@@ -7,17 +9,17 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 
-/// How many symbolic links are followed in a row; as many as Linux does.
+/// Symbolic links that are followed in a row: as many as Linux follows.
 const LINKS: usize = 40;
 
-/// Writes a file beside its place and renames it: it is whole or not there.
+/// Writes a temporary file in the same folder, and renames it to `path` when it is complete.
 ///
-/// A symbolic link stays one: the file it leads to is replaced. A device or a FIFO is written straight into;
-/// a rename would put a file in its place.
+/// A symbolic link stays a link, and its target is replaced. A device or a FIFO is written to directly,
+/// because a rename would replace it by a file.
 ///
 /// # Errors
-/// When `write` fails, or the file cannot be made.
-pub fn write<T>(
+/// `write` fails, or the file cannot be created.
+pub fn write_atomically<T>(
     path: &Path,
     write: impl FnOnce(&mut File) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
@@ -46,13 +48,13 @@ fn folder(path: &Path) -> &Path {
     }
 }
 
-/// Where links lead. `canonicalize` would not do: there may be nothing there yet.
+/// Returns the end of a chain of links. `canonicalize` fails if the target does not exist yet.
 fn follow(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..LINKS {
         match fs::read_link(&path) {
             Ok(link) => path = folder(&path).join(link),
-            // No link (or nothing at all): the end.
+            // Not a link, or nothing at all.
             Err(_) => return Ok(path),
         }
     }
@@ -69,15 +71,15 @@ mod tests {
     use super::*;
 
     fn hello(path: &Path) -> anyhow::Result<()> {
-        write(path, |file| Ok(file.write_all(b"hello")?))
+        write_atomically(path, |file| Ok(file.write_all(b"hello")?))
     }
 
     #[test]
-    fn file_is_replaced_only_by_a_whole_one() {
+    fn a_file_is_replaced_only_by_a_complete_one() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         fs::write(&path, "old").unwrap();
-        let half = write(&path, |file| {
+        let half = write_atomically(&path, |file| {
             file.write_all(b"half")?;
             anyhow::bail!("no more")
         });
@@ -87,7 +89,7 @@ mod tests {
         hello(&path).unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"hello");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
-        assert!(hello(folder.path()).is_err(), "a folder is no file");
+        assert!(hello(folder.path()).is_err(), "a folder is not a file");
     }
 
     #[test]

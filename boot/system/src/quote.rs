@@ -1,8 +1,8 @@
-//! Foreign bytes in messages.
+//! Quotation of foreign bytes in messages.
 //!
-//! A file, a dump, QEMU or the serial line may hold any bytes, and a terminal obeys some of them:
-//! escape sequences recolour, retitle or rewrite the screen. Messages therefore show every byte that
-//! does not print as an escape (`\x1b`, `\u{202e}`).
+//! A file, a dump, QEMU or the serial line may contain any bytes, and a terminal obeys some of them: escape
+//! sequences change colours, the title and the text on the screen. Messages therefore show every unprintable
+//! byte as an escape (`\x1b`, `\u{202e}`).
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -12,7 +12,7 @@ const MOST: usize = 40;
 
 /// Returns foreign bytes in single quotes: escaped, and cut after 40 characters.
 ///
-/// A cut quotation ends in `...` and the number of bytes that the whole has.
+/// A cut quotation ends in `...` and the number of bytes in the original.
 pub fn quoted(bytes: impl AsRef<[u8]>) -> String {
     let bytes = bytes.as_ref();
     let (mut said, mut length) = (String::from("'"), 0);
@@ -33,7 +33,7 @@ pub fn quoted(bytes: impl AsRef<[u8]>) -> String {
     said + "'"
 }
 
-/// Returns a path, escaped and whole: the reader looks for the file.
+/// Returns a path, escaped but not cut, so that the reader can find the file.
 pub fn path(path: &Path) -> String {
     let bytes = path.as_os_str().as_encoded_bytes();
     bytes
@@ -45,8 +45,8 @@ pub fn path(path: &Path) -> String {
         .collect()
 }
 
-/// Returns text as a terminal may get it: its lines and tabs stay, all else that does not print is
-/// escaped.
+/// Returns text that is safe for a terminal: line ends and tabs stay, and every other unprintable character
+/// is escaped.
 pub fn printable(text: &str) -> Cow<'_, str> {
     let plain = |c: char| matches!(c, ' '..='~' | '\n' | '\t');
     if text.chars().all(plain) {
@@ -59,12 +59,12 @@ pub fn printable(text: &str) -> Cow<'_, str> {
     text.chars().map(keep).collect()
 }
 
-/// Returns a character as it is if it prints, else its escape.
+/// Returns a printable character unchanged, and the escape of any other.
 fn escaped(c: char) -> String {
     match c {
         ' '..='~' => c.into(),
         _ if c.is_ascii() => format!("\\x{:02x}", c as u32),
-        // `str` escapes what does not print. A combining mark prints behind a letter.
+        // A combining mark prints behind a letter, so let `str` see it behind one.
         _ => format!("a{c}").escape_debug().skip(1).collect(),
     }
 }
@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(quoted(long), cut);
         let escapes = quoted([0x1b; 100]);
         assert_eq!(escapes, format!("'{}...' (100 bytes)", r"\x1b".repeat(10)));
-        // A name of the file system's longest kind stays whole.
+        // The longest path that Linux allows is not cut.
         let name = "y".repeat(4096);
         assert_eq!(path(Path::new(&name)), name);
     }

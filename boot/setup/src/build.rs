@@ -15,10 +15,10 @@ use tempfile::TempDir;
 use super::apt::sha256;
 use super::cache::Locked;
 use super::pin;
-use super::progress::Step;
 use super::settings;
 use super::toolchain::Toolchain;
-use crate::child::{self, Event};
+use system::Step;
+use system::child::{self, Event};
 
 /// The kernel's cargo home, in the cache.
 const CARGO_HOME: &str = "cargo";
@@ -60,8 +60,9 @@ impl Program {
 /// The workspace's root.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("the crate is a folder of the workspace")
+        .ancestors()
+        .nth(2)
+        .expect("the crate is two folders below the root")
 }
 
 /// The workspace's target folder: the one this very program was built in.

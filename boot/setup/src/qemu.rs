@@ -14,8 +14,8 @@ use anyhow::{Context, bail};
 use super::Options;
 use super::apt::{self, MACHINE, Wanted};
 use super::cache::{Cache, Locked, is_full};
-use super::progress::say;
-use crate::child::{self, Interrupted};
+use system::say;
+use system::{Interrupted, child};
 
 const PROGRAM: &str = "qemu-system-x86_64";
 

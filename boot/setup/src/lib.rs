@@ -12,13 +12,14 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use system::bytes;
+
 mod apt;
 mod build;
 mod cache;
 mod debian;
 mod doctor;
 mod pin;
-mod progress;
 mod qemu;
 mod rustup;
 mod settings;
@@ -27,7 +28,6 @@ mod toolchain;
 use build::Program;
 pub use build::root;
 use cache::Cache;
-pub use progress::{Step, say};
 pub use qemu::Qemu;
 
 /// What the user may decide about the set-up.
@@ -64,7 +64,7 @@ pub fn folder() -> PathBuf {
 ///
 /// # Errors
 /// When a part cannot be had: the message says what was tried, why it failed and what to do by hand.
-/// [`Interrupted`](crate::child::Interrupted) when the user stopped it.
+/// [`Interrupted`](system::Interrupted) when the user stopped it.
 pub fn ready(options: &Options) -> anyhow::Result<Ready> {
     ready_with(options, Program::Show)
 }
@@ -151,18 +151,13 @@ pub fn clean(out: &mut impl Write) -> anyhow::Result<u64> {
     let cache = Cache::find()?.lock()?;
     let mut freed = 0;
     for folder in cache.contents()?.into_iter().chain(build::folders()) {
-        let bytes = cache::size(&folder);
+        let size = cache::size(&folder);
         if folder.exists() {
             cache::remove(&folder)?;
-            writeln!(
-                out,
-                "removed {} ({})",
-                folder.display(),
-                progress::bytes(bytes)
-            )?;
-            freed += bytes;
+            writeln!(out, "removed {} ({})", folder.display(), bytes(size))?;
+            freed += size;
         }
     }
-    writeln!(out, "{} freed", progress::bytes(freed))?;
+    writeln!(out, "{} freed", bytes(freed))?;
     Ok(freed)
 }

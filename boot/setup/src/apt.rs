@@ -16,9 +16,9 @@ use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::cache::{self, Locked, is_full};
-use super::progress::{Step, bytes};
 use super::toolchain::offline;
-use crate::child::{self, Interrupted};
+use system::{Interrupted, child};
+use system::{Step, bytes};
 
 /// The list of a folder's packages, in apt-get's words. It is written when all of them are there.
 const LIST: &str = "list";

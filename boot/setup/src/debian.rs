@@ -13,9 +13,9 @@ use anyhow::{Context, bail};
 use super::apt::{self, MACHINE, Package, Wanted};
 use super::cache::{self, Cache, Locked, is_full};
 use super::pin;
-use super::progress::say;
 use super::toolchain::{self, Toolchain, VARIABLE};
-use crate::child::{self, Interrupted};
+use system::say;
+use system::{Interrupted, child};
 
 /// The compiler's packages.
 const WANTED: Wanted = Wanted {

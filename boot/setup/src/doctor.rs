@@ -5,10 +5,10 @@ use std::io::Write;
 use std::path::Path;
 
 use super::cache::{self, Cache};
-use super::progress::bytes;
 use super::toolchain::{self, Toolchain};
 use super::{Options, Qemu, apt, build, debian, pin, qemu};
-use crate::child;
+use system::bytes;
+use system::child;
 
 /// Writes the report; true when nothing is missing.
 pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {

@@ -1,7 +1,8 @@
-//! What the set-up says while it works.
+//! Messages and progress on standard error.
 //!
-//! Straight to standard error, not by `eprintln!`: libtest captures that, and a first `cargo test` would be
-//! silent for minutes. On a terminal a moving line, elsewhere (CI logs) a plain line now and then.
+//! On a terminal progress is a moving bar; elsewhere, such as in the log of a CI job, it is a line now and
+//! then. Nothing here uses `eprintln!`: libtest captures its output, and a first `cargo test` would be silent for
+//! minutes.
 
 use std::fmt::Display;
 use std::io::{IsTerminal, Write, stderr};
@@ -12,37 +13,37 @@ use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 use crate::child::Event;
 use crate::quote;
 
-/// Without a terminal: this long without a word is long enough.
+/// The longest silence without a terminal.
 const SILENCE: Duration = Duration::from_secs(10);
 
-/// Writes a message to standard error, on lines of its own; lost where that is closed.
+/// Writes a message to standard error. The message is lost if standard error is closed.
 ///
-/// Whatever the message quotes, no escape sequence in it reaches the terminal.
+/// No escape sequence in the message reaches the terminal.
 pub fn say(text: impl Display) {
     let text = text.to_string();
-    // There is no other place to report that standard error is closed.
+    // A closed standard error cannot be reported anywhere.
     let _ = writeln!(stderr().lock(), "{}", quote::printable(&text));
 }
 
-/// Bytes as people read them.
+/// Returns a number of bytes in a readable unit.
 pub fn bytes(count: u64) -> impl Display {
     HumanBytes(count)
 }
 
-/// A step that takes a while: announced when made, then told how far it is.
+/// A step that takes a while. It is announced when it is made, and then shows its progress.
 #[derive(Debug)]
 pub struct Step {
     total: u64,
     begun: Instant,
-    /// Without a terminal: when the last line was written, and how far it was, in per cent.
+    /// Without a terminal: the time of the last line, and the progress at that time in percent.
     said: (Instant, u64),
-    /// How an amount is told.
+    /// Formats an amount.
     amount: fn(u64) -> String,
     bar: Option<ProgressBar>,
 }
 
 impl Step {
-    /// A step of `total` bytes, or of unknown length (0).
+    /// Begins a step of `total` bytes; 0 if the length is unknown.
     pub fn new(what: impl Display, total: u64) -> Self {
         let template = match total {
             0 => "  {spinner} {elapsed}",
@@ -51,7 +52,7 @@ impl Step {
         Self::with(what, total, template, |count| bytes(count).to_string())
     }
 
-    /// A step of `total` things.
+    /// Begins a step of `total` items.
     pub fn counting(what: impl Display, total: u64) -> Self {
         let template = "  {wide_bar} {pos} of {len}, {elapsed}";
         Self::with(what, total, template, |count| count.to_string())
@@ -73,9 +74,9 @@ impl Step {
         }
     }
 
-    /// This many bytes are done (of unknown length: any number).
+    /// Shows that `done` bytes or items are finished. Any number will do if the length is unknown.
     pub fn at(&mut self, done: u64) {
-        // Estimates and file system overhead: never more than all.
+        // An estimate may exceed the total.
         let done = done.min(self.total);
         if let Some(bar) = &self.bar {
             bar.tick();
@@ -86,7 +87,7 @@ impl Step {
             self.said = (Instant::now(), percent);
             match self.total {
                 0 => say(format_args!(
-                    "  {} s, still at it",
+                    "  {} s so far",
                     self.begun.elapsed().as_secs()
                 )),
                 total => say(format_args!(
@@ -98,7 +99,7 @@ impl Step {
         }
     }
 
-    /// A line of a child's own words.
+    /// Shows a line of a child's output.
     pub fn line(&mut self, text: &str) {
         self.said.0 = Instant::now();
         match &self.bar {
@@ -107,7 +108,7 @@ impl Step {
         }
     }
 
-    /// A child's events, when only its life matters: `done` tells how far it is.
+    /// Shows progress at each tick of a child, by `done`, and ignores the child's output.
     pub fn on(&mut self, event: Event, done: impl FnOnce() -> u64) {
         if let Event::Tick = event {
             self.at(done());

@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, bail};
 
 use super::cache::{Cache, Locked, is_full};
-use super::progress::say;
 use super::{Options, debian, pin, rustup, settings};
-use crate::child::{self, Interrupted};
+use system::say;
+use system::{Interrupted, child};
 
 /// Names a complete toolchain in the environment.
 pub const VARIABLE: &str = "CRYSTAL_BALL_TOOLCHAIN";

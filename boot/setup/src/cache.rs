@@ -13,8 +13,8 @@ use anyhow::Context;
 use etcetera::BaseStrategy;
 use tempfile::TempDir;
 
-use super::progress::{bytes, say};
-use crate::child::{Interrupted, interrupted};
+use system::{Interrupted, interrupted};
+use system::{bytes, say};
 
 const LOCK: &str = "lock";
 const ASIDE: &str = "aside";

@@ -10,9 +10,9 @@ use anyhow::{Context, bail};
 
 use super::cache::{self, Locked};
 use super::pin;
-use super::progress::Step;
 use super::toolchain::{self, Toolchain, offline};
-use crate::child;
+use system::Step;
+use system::child;
 
 /// The user's own toolchain of the pinned version, if it is complete; used in place.
 pub fn installed() -> Option<Toolchain> {
