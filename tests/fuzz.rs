@@ -14,8 +14,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use crystal_ball::indexed::Indexed;
-use crystal_ball::model::{Model, obj, solid, texture};
 use fastrand::Rng;
+use import::{Model, obj, solid, texture};
 use in_place::InPlace;
 use modex::PlanarBuffer;
 use pack::{Arena, MAX_BYTES, Pack, Parts};

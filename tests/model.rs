@@ -4,8 +4,8 @@ use std::fs;
 
 use crystal_ball::card::{self, Card, Emulated};
 use crystal_ball::machine::{Config, Machine};
-use crystal_ball::model::Model;
 use crystal_ball::screen::Screen;
+use import::Model;
 use link::{Command, Content, Picture, Setting, Word};
 use setup::Options;
 use tempfile::TempDir;

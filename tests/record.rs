@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
 use crystal_ball::diff::Subject;
-use crystal_ball::indexed::{Indexed, widen};
+use crystal_ball::indexed::Indexed;
+use vga::widen;
 
 use crate::ready::READY;
 

@@ -16,9 +16,9 @@ use show::{Memory, Show};
 use vga::Vga;
 
 use crate::dump::Dump;
-use crate::indexed::widen;
 use crate::look::Look;
 use crate::screen::Screen;
+use vga::widen;
 
 /// Returns empty memory for the program. It is built in place: about 4 MiB are more than a thread's stack
 /// holds.

@@ -5,6 +5,7 @@ use std::io::{BufRead, Seek, Write};
 
 use anyhow::{Context, bail};
 use modex::Rgb6;
+use vga::widen;
 
 /// A picture whose pixels are indices into its palette.
 #[derive(Clone, PartialEq, Eq)]
@@ -23,12 +24,6 @@ impl fmt::Debug for Indexed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a picture of {} x {}", self.width, self.height)
     }
-}
-
-/// Six bits of a colour's part as eight, in the way of QEMU's DAC, so that a PNG and a screendump
-/// show the same colour.
-pub fn widen(part: u8) -> u8 {
-    (part << 2) | ((part & 1) * 3)
 }
 
 impl Indexed {

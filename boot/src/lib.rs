@@ -9,7 +9,6 @@ pub mod indexed;
 pub mod look;
 pub mod machine;
 pub mod measure;
-pub mod model;
 pub mod record;
 pub mod replay;
 pub mod report;

@@ -18,11 +18,12 @@ use link::{Command, Content, Picture, TICKS_PER_SECOND};
 
 use crate::card::{Card, Emulated};
 use crate::frames::range;
-use crate::indexed::{Indexed, widen};
+use crate::indexed::Indexed;
 use crate::look::Look;
 use crate::machine::Machine;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
+use vga::widen;
 
 /// Which frames, and where to.
 #[derive(Args, Clone, Debug)]

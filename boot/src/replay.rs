@@ -13,10 +13,11 @@ use console::Term;
 use scene::font;
 
 use crate::diff::{Subject, list};
-use crate::indexed::{Indexed, widen};
+use crate::indexed::Indexed;
 use crate::screen::Screen;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
+use vga::widen;
 
 /// Which pictures, and how they are shown.
 #[derive(Args, Clone, Debug)]

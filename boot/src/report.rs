@@ -19,9 +19,10 @@ use modex::Rgb6;
 
 use crate::diff::{Bounds, Colour, Difference, Shape, Subject, colour, differing_entries};
 use crate::dump::Dump;
-use crate::indexed::{Indexed, widen};
+use crate::indexed::Indexed;
 use crate::screen::Screen;
 use system::write_atomically;
+use vga::widen;
 
 const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");

@@ -486,7 +486,7 @@ impl Found {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::Model;
+    use import::Model;
 
     #[test]
     fn a_debug_build_refuses() {

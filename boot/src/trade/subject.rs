@@ -86,9 +86,7 @@ impl<'a> Subject<'a> {
             about,
             pictures,
             textures: (0..=most).map(|number| stage.surface(number)).collect(),
-            palette: stage
-                .palette()
-                .map(|colour| colour.map(crate::indexed::widen)),
+            palette: stage.palette().map(|colour| colour.map(vga::widen)),
             background: *stage.background(),
         }
     }

@@ -2,6 +2,13 @@
 
 use crate::fault::Complaint;
 
+/// Returns a part of a colour in eight bits, given its six bits in the DAC.
+///
+/// The low bits repeat bit 0, as QEMU's DAC does, so a PNG and a screendump show the same colour.
+pub fn widen(part: u8) -> u8 {
+    (part << 2) | ((part & 1) * 3)
+}
+
 /// The colours, and where the next part of one goes.
 #[derive(Clone, Debug)]
 pub(crate) struct Dac {

@@ -43,5 +43,6 @@ mod sequencer;
 mod vga;
 
 pub use crtc::Latch;
+pub use dac::widen;
 pub use fault::{Access, Fault};
 pub use vga::Vga;

@@ -12,9 +12,12 @@
 pub mod colour;
 mod guard;
 mod kind;
+pub mod layout;
 pub mod mesh;
 pub mod obj;
+pub mod polygon;
 pub mod texture;
+mod vector;
 
 use std::fmt;
 use std::fs::File;
@@ -26,14 +29,15 @@ use anyhow::{Context, anyhow, bail};
 use pack::{Pack, Parts};
 use scene::Mesh;
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
+use system::quote;
 use texmap::Texture;
 
 use colour::Reduced;
-use mesh::{Polygons, Solid, Tally, Turned};
+use layout::Layout;
+use mesh::{Solid, Turned};
 use obj::{BadLine, Obj};
-use texture::{Layout, Picture};
-
-use system::quote;
+use polygon::{Polygons, Tally};
+use texture::Picture;
 
 /// Most bytes of an OBJ: far more than a model of [`scene::MAX_FACES`] faces has.
 const MAX_BYTES: u64 = 64 << 20;
@@ -215,7 +219,7 @@ impl Model {
 pub fn solid(obj: &Obj, picture: (u32, u32)) -> anyhow::Result<(Solid, Layout)> {
     let polygons = Polygons::new(obj)?;
     let layout = Layout::new(&polygons.polygons, picture)?;
-    Ok((polygons.solid(&layout)?, layout))
+    Ok((Solid::new(polygons, &layout)?, layout))
 }
 
 /// Reads an OBJ's bytes.

@@ -21,8 +21,7 @@ use quantette::{Pipeline, QuantizeMethod};
 use scene::catalogue::Colours;
 use scene::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable};
 use show::HEAT;
-
-use crate::indexed::widen;
+use vga::widen;
 
 /// Texels of one material: two by two.
 const VARIANTS: usize = 4;

@@ -9,7 +9,6 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail};
-
 use system::{Interrupted, interrupted};
 
 /// How often the waiting thread looks up.

@@ -1,23 +1,14 @@
-//! From a PNG to the texels of a model.
-//!
-//! An OBJ's texture has no end: it repeats to all sides. A texture here is a rectangle of at most
-//! 256 texels a side, so it gets what the faces use of that plane and no more. Each face is moved by
-//! whole textures to where its coordinates begin in the first one. The rectangle around all of them
-//! is then cut from the plane, and the picture is scaled down until it fits. A model that uses a
-//! corner of its picture has that corner in full sharpness; one that repeats it four times has a
-//! quarter of it. It is never scaled up.
+//! From a PNG to opaque pixels.
 
 use std::io::{BufRead, Seek};
 
 use anyhow::{Context, anyhow, bail, ensure};
-use image::imageops::{FilterType, resize};
-use image::{Rgb, RgbImage};
+use image::RgbImage;
 use png::{BitDepth, ColorType, Decoder, Transformations};
 
-use super::kind;
-use super::mesh::Polygon;
-use super::obj::BadLine;
 use system::quote::quoted;
+
+use crate::kind;
 
 /// How every PNG begins.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -26,14 +17,6 @@ pub const MAX_PIXELS: u32 = 8192;
 /// The colour beneath a picture's transparent parts. Black writing and white writing without a
 /// ground both stay readable on grey.
 pub const GROUND: [u8; 3] = [128; 3];
-/// Most times that a face may repeat the texture: then four texels are left of it.
-const MAX_REPEATS: f64 = 64.0;
-/// So far a coordinate may be beyond a border of the texture, in textures, and is taken to mean the
-/// border: programs write 1.0001, and half a texel is not seen.
-const SLACK: f64 = 1.0 / 512.0;
-/// One texel of a corner's place.
-const TEXEL: f64 = 65_536.0;
-
 /// A picture, opaque.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
@@ -137,178 +120,11 @@ fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32
     }
 }
 
-/// What is cut from the plane of repeated pictures, along one axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Window {
-    /// Texels of the whole picture.
-    picture: u32,
-    /// The first texel that is cut, from the first picture's begin.
-    first: i64,
-    /// How many are cut, 1 to 256.
-    texels: u16,
-}
-
-impl Window {
-    /// For coordinates from `low` to `high`, in whole pictures of `pixels`.
-    fn around(low: f64, high: f64, pixels: u32) -> Self {
-        let mut picture = pixels.min((256.0 / (high - low).max(1e-9)) as u32).max(1);
-        loop {
-            let first = (low * f64::from(picture)).floor() as i64;
-            let end = (high * f64::from(picture)).ceil() as i64;
-            let texels = (end - first).max(1);
-            // The borders of texels lie about the window's: it may be one too many.
-            if texels <= 256 || picture == 1 {
-                return Self {
-                    picture,
-                    first,
-                    texels: texels.min(256) as u16,
-                };
-            }
-            picture -= 1;
-        }
-    }
-
-    /// The place of a coordinate, 16.16.
-    fn place(&self, coordinate: f64) -> i32 {
-        let texel = coordinate * f64::from(self.picture) - self.first as f64;
-        (texel.clamp(0.0, self.texels.into()) * TEXEL).round() as i32
-    }
-
-    /// The picture's pixel of a texel.
-    fn pixel(&self, texel: u32) -> u32 {
-        (self.first + i64::from(texel)).rem_euclid(self.picture.into()) as u32
-    }
-}
-
-/// The whole pictures that a polygon is moved by, so that it begins in the first one.
-fn begin(polygon: &Polygon, axis: usize) -> f64 {
-    let low = polygon.along(axis).fold(f64::INFINITY, f64::min);
-    (low + SLACK).floor()
-}
-
-/// From where to where a polygon is in the pictures, once it was moved.
-fn range(polygon: &Polygon, axis: usize) -> (f64, f64) {
-    let begin = begin(polygon, axis);
-    let moved = polygon.along(axis).map(|place| place - begin);
-    let (low, high) = moved.fold((f64::INFINITY, 0.0), |(low, high), place| {
-        (f64::min(low, place), f64::max(high, place))
-    });
-    let border = high.round();
-    let over = high > border && high - border <= SLACK;
-    (low.max(0.0), if over { border } else { high })
-}
-
-/// How a model's texture is cut from its picture.
-#[derive(Clone, Copy, Debug)]
-pub struct Layout {
-    across: Window,
-    down: Window,
-}
-
-impl Layout {
-    /// What the polygons use of a picture of `size` pixels.
-    ///
-    /// # Errors
-    /// The first polygon that repeats the picture more often than `MAX_REPEATS` times.
-    pub fn new(polygons: &[Polygon], (width, height): (u32, u32)) -> Result<Self, BadLine> {
-        let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
-        for polygon in polygons {
-            for (axis, (low, high)) in ranges.iter_mut().enumerate() {
-                let (from, to) = range(polygon, axis);
-                if to - from > MAX_REPEATS {
-                    let why = format!(
-                        "the face repeats the texture {:.0} times, and at most {MAX_REPEATS} fit \
-                         into 256 texels; cut the face or scale its texture coordinates",
-                        to - from
-                    );
-                    return Err(BadLine {
-                        line: polygon.line,
-                        why,
-                    });
-                }
-                *low = low.min(from);
-                *high = high.max(to);
-            }
-        }
-        let [(left, right), (top, bottom)] = ranges;
-        Ok(Self {
-            across: Window::around(left, right, width),
-            down: Window::around(top, bottom, height),
-        })
-    }
-
-    /// The texture's sides.
-    pub fn size(&self) -> (u16, u16) {
-        (self.across.texels, self.down.texels)
-    }
-
-    /// Where a polygon's corners are in the texture, 16.16 texels.
-    pub fn texels(&self, polygon: &Polygon) -> impl Iterator<Item = [i32; 2]> {
-        let [across, down] = [0, 1].map(|axis| begin(polygon, axis));
-        let u = polygon.along(0).map(move |u| self.across.place(u - across));
-        let v = polygon.along(1).map(move |v| self.down.place(v - down));
-        u.zip(v).map(|(u, v)| [u, v])
-    }
-
-    /// The texels, row by row. `pixel` has the picture's pixel in a column and a row, when it is
-    /// scaled to [`Layout::scaled`].
-    pub fn cut<T>(&self, pixel: impl Fn(u32, u32) -> T) -> Vec<T> {
-        let (columns, rows) = self.size();
-        let mut texels = Vec::with_capacity(usize::from(columns) * usize::from(rows));
-        for j in 0..u32::from(rows) {
-            let row =
-                (0..u32::from(columns)).map(|i| pixel(self.across.pixel(i), self.down.pixel(j)));
-            texels.extend(row);
-        }
-        texels
-    }
-
-    /// The size that the whole picture is scaled to; never larger than it is.
-    pub fn scaled(&self) -> (u32, u32) {
-        (self.across.picture, self.down.picture)
-    }
-
-    /// The texels of a picture, row by row.
-    pub fn cut_scaled(&self, picture: &RgbImage) -> Vec<Rgb<u8>> {
-        let (width, height) = self.scaled();
-        if picture.dimensions() == (width, height) {
-            return self.cut(|i, j| *picture.get_pixel(i, j));
-        }
-        let picture = resize(picture, width, height, FilterType::CatmullRom);
-        self.cut(|i, j| *picture.get_pixel(i, j))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::Cursor;
 
     use super::*;
-    use crate::model::mesh::Polygons;
-    use crate::model::obj;
-
-    /// The layout of triangles with these coordinates, and where their corners are in texels.
-    fn laid_out(triangles: &[[[f64; 2]; 3]], picture: (u32, u32)) -> (Layout, Vec<[f64; 2]>) {
-        let mut text = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
-        for [u, v] in triangles.as_flattened() {
-            text += &format!("vt {u} {v}\n");
-        }
-        for i in 0..triangles.len() {
-            // Against the clock, so that they come back in their order.
-            let [a, b, c] = [1, 2, 3].map(|k| 3 * i + k);
-            text += &format!("f 3/{c} 2/{b} 1/{a}\n");
-        }
-        let polygons = Polygons::new(&obj::parse(text.as_bytes()).unwrap()).unwrap();
-        let layout = Layout::new(&polygons.polygons, picture).unwrap();
-        let places = polygons
-            .polygons
-            .iter()
-            .flat_map(|polygon| layout.texels(polygon));
-        let places = places.map(|place| place.map(|k| f64::from(k) / TEXEL));
-        (layout, places.collect())
-    }
-
-    const WHOLE: [[f64; 2]; 3] = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]];
 
     /// A PNG of rows of bytes.
     fn encoded(
@@ -496,7 +312,9 @@ mod tests {
             .flat_map(|i| [i as u8, (i >> 8) as u8, 255, 0])
             .collect();
         let bytes = encoded((300, 300), Rgba, Eight, &hidden, |_| {});
-        let (layout, _) = laid_out(&[WHOLE], (300, 300));
+        let face = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
+        let face = crate::obj::parse(face).unwrap();
+        let (_, layout) = crate::solid(&face, (300, 300)).unwrap();
         let texels = layout.cut_scaled(&read(Cursor::new(bytes)).unwrap().pixels);
         assert!(texels.iter().all(|texel| texel.0 == GROUND));
     }
@@ -508,70 +326,4 @@ mod tests {
          37308a891ace008409de788b04c315d6911b0faca7ca2edbf20b4bcdebf11dbb25232fd245165f3386b91420\
          a7183209a56c69f45677b21f3ba253ad6aebc6b46fdf639b3cc33e6dd47a2f676d171fd0f74601a696b4fa00\
          00000049454e44ae426082";
-
-    #[test]
-    fn a_small_picture_stays_as_it_is_and_a_large_one_is_scaled_to_fit() {
-        for (picture, size) in [
-            ((256, 256), (256, 256)),
-            ((1, 7), (1, 7)),
-            ((512, 100), (256, 100)),
-            ((300, 8192), (256, 256)),
-        ] {
-            let (layout, places) = laid_out(&[WHOLE], picture);
-            assert_eq!(layout.size(), size);
-            assert_eq!(layout.scaled(), (size.0.into(), size.1.into()));
-            let (w, h) = (f64::from(size.0), f64::from(size.1));
-            assert_eq!(places, [[0.0, 0.0], [w, 0.0], [0.0, h]]);
-        }
-    }
-
-    #[test]
-    fn only_what_is_used_is_cut_and_in_full_sharpness() {
-        let corner = [[0.5, 0.25], [0.75, 0.25], [0.5, 0.0]];
-        let (layout, places) = laid_out(&[corner], (512, 512));
-        assert_eq!((layout.size(), layout.scaled()), ((128, 128), (512, 512)));
-        assert_eq!(places, [[0.0, 0.0], [128.0, 0.0], [0.0, 128.0]]);
-        let pixels = layout.cut(|i, j| (i, j));
-        assert_eq!((pixels[0], pixels[128 * 128 - 1]), ((256, 384), (383, 511)));
-    }
-
-    #[test]
-    fn what_repeats_is_repeated_and_each_face_is_moved_to_the_first() {
-        let wide = [[-3.0, 8.0], [-1.0, 8.0], [-3.0, 7.0]];
-        let (layout, places) = laid_out(&[wide, WHOLE], (256, 256));
-        assert_eq!((layout.size(), layout.scaled()), ((256, 256), (128, 256)));
-        assert_eq!(places[..3], [[0.0, 0.0], [256.0, 0.0], [0.0, 256.0]]);
-        assert_eq!(places[3..], [[0.0, 0.0], [128.0, 0.0], [0.0, 256.0]]);
-        let row = layout.cut(|i, _| i);
-        assert_eq!((row[127], row[128], row[255]), (127, 0, 127));
-    }
-
-    #[test]
-    fn a_hair_beyond_the_border_is_the_border() {
-        let hair = [[-0.0005, 1.0004], [1.0006, 1.0], [0.0, -0.001]];
-        let (layout, places) = laid_out(&[hair], (256, 256));
-        assert_eq!(layout.size(), (256, 256));
-        assert_eq!(places[1][0], 256.0);
-        assert_eq!(places[0], [0.0, 0.0]);
-    }
-
-    #[test]
-    fn every_window_fits_whatever_the_coordinates() {
-        let mut random = seeded::generator();
-        for case in 0..20_000 {
-            let low = random.f64();
-            let high = low + random.f64().powi(8) * MAX_REPEATS;
-            let pixels = random.u32(1..=MAX_PIXELS);
-            let window = Window::around(low, high, pixels);
-            assert!(
-                window.picture <= pixels && (1..=256).contains(&window.texels),
-                "{case}"
-            );
-            for (place, border) in [(low, 0.0), (high, f64::from(window.texels))] {
-                let texel = place * f64::from(window.picture) - window.first as f64;
-                assert!((texel - border).abs() <= 1.0, "{case}: {window:?}");
-            }
-            assert!(window.pixel(u32::from(window.texels) - 1) < window.picture);
-        }
-    }
 }

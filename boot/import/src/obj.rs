@@ -24,7 +24,6 @@ use std::borrow::Cow;
 use std::fmt;
 
 use scene::MAX_VERTICES;
-
 use system::quote::quoted;
 
 /// Largest coordinate, either sign: a model's size is squared on the way.

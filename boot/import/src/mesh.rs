@@ -1,10 +1,5 @@
 //! From an OBJ's polygons to a mesh of flat convex faces.
 //!
-//! The model is centred and scaled so that a ball of [`RADIUS`] holds it: at the default distance it
-//! fits the screen however it is turned. Then its points are rounded to the mesh's grid, and points
-//! that are one there become one; everything after that is decided on the grid, which is what the
-//! kernel sees.
-//!
 //! # Whole, or cut
 //!
 //! A face of the renderer is convex, flat, and has one texture plane. A polygon that is all of it
@@ -12,28 +7,18 @@
 //! always. Flat is what bends by at most `FLATNESS`, and one plane is what is off by at most
 //! `TEXEL_FIT` texels at a corner: less than can be seen. All pieces of a polygon have its normal,
 //! so that no cut shows in the light.
-//!
-//! # Texture coordinates that are not there
-//!
-//! are made up for every face that lacks one of its own, by projection onto a box about the model's
-//! centre: of its normal's three parts the largest one says which side of the box the face is on,
-//! and each side has the whole texture once. It fits one plane always, has no seam within a face,
-//! and stretches by at most the square root of three.
-
-use std::collections::HashMap;
 
 use anyhow::ensure;
 use earcut::Earcut;
 use earcut::utils3d::project3d_to_2d;
 use pack::MAX_ALL_CORNERS;
-use scene::{Corner, Face, MAX_CORNERS, MAX_FACES, MAX_VERTICES, Pose, Vec3};
+use scene::{Corner, Face, MAX_CORNERS, MAX_FACES, Pose, Vec3};
 
-use super::obj::{BadLine, Obj, SIMPLIFY};
-use super::texture::Layout;
+use crate::layout::Layout;
+use crate::obj::{BadLine, SIMPLIFY};
+use crate::polygon::{GRID, Place, Polygons, Tally};
+use crate::vector::{cross, dot, minus};
 
-/// Of the ball that holds the model, in units. From the default distance of 2.95 units its outline
-/// is 115 pixels from the screen's middle, of the 120 to the edge.
-pub const RADIUS: f64 = 1.2;
 /// Furthest that a corner of a face may be from the face's plane, in units: a fifteenth of a pixel
 /// at the default distance.
 const FLATNESS: f64 = 1.0 / 2048.0;
@@ -41,9 +26,6 @@ const FLATNESS: f64 = 1.0 / 2048.0;
 const TEXEL_FIT: f64 = 1.0 / 16.0;
 /// Smallest part of a face's area that the three corners may have that its texture plane is made of.
 const LEAST_ANCHORED: f64 = 1.0 / 16.0;
-/// One unit on the mesh's grid.
-const GRID: f64 = 65_536.0;
-
 /// A solid, owned.
 #[derive(Clone, Debug, Default)]
 pub struct Solid {
@@ -69,223 +51,25 @@ pub enum Turned {
 }
 
 impl Solid {
-    /// Finds out whether the faces were made with the other winding rule.
-    pub fn turned(&self) -> Turned {
-        let pose = Pose::at_tick(0);
-        let turn = pose.orientation();
-        let (mut inside, mut away) = (true, true);
-        let mut corners = &self.corners[..];
-        for face in &self.faces {
-            let (own, rest) = corners.split_at(face.corners.into());
-            corners = rest;
-            // Any point of its plane does; the face may be bent, so the middle of its corners.
-            let vertex = |corner: &Corner| self.vertices[usize::from(corner.vertex)];
-            let sum = own.iter().map(vertex).fold([0.0; 3], |sum, at| {
-                [0, 1, 2].map(|k| sum[k] + f64::from(at[k]))
-            });
-            let middle = sum.map(|k| k / f64::from(face.corners));
-            inside &= dot(middle, face.normal.map(f64::from)) < 0.0;
-            let seen = turn.turn(middle.map(|k| k.round() as i32)).map(f64::from);
-            let from_eye = [seen[0], seen[1], seen[2] + f64::from(pose.distance)];
-            away &= dot(from_eye, turn.turn(face.normal).map(f64::from)) >= 0.0;
-        }
-        match (inside, away) {
-            (true, _) => Turned::Inside,
-            (_, true) => Turned::Away,
-            _ => Turned::Seen,
-        }
-    }
-}
-
-/// What became of the file's faces.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
-    /// Without an area: dropped.
-    pub degenerate: usize,
-    /// Not convex, not flat, of too many corners or of no one texture plane: cut into triangles.
-    pub cut: usize,
-    /// Without texture coordinates: made up.
-    pub projected: usize,
-}
-
-/// A polygon on the grid, clockwise as it is seen from its front, and with an area.
-#[derive(Clone, Debug)]
-pub struct Polygon {
-    ring: Vec<Place>,
-    normal: [f64; 3],
-    /// The line of the file that it is on.
-    pub line: usize,
-}
-
-/// A corner of a polygon.
-#[derive(Clone, Copy, Debug)]
-struct Place {
-    vertex: usize,
-    /// On the mesh's grid.
-    at: [f64; 3],
-    /// In whole textures, to the right and down.
-    uv: [f64; 2],
-}
-
-impl Polygon {
-    /// Where its corners are in the texture, in whole textures: to the right, or down.
-    pub fn along(&self, axis: usize) -> impl Iterator<Item = f64> {
-        self.ring.iter().map(move |place| place.uv[axis])
-    }
-
-    /// Makes up its texture coordinates.
-    fn project(&mut self) {
-        let side = (0..3).fold(0, |a, b| {
-            if self.normal[b].abs() > self.normal[a].abs() {
-                b
-            } else {
-                a
-            }
-        });
-        // What is to the right and down on that side of the box as one looks at it from outside:
-        // the top and the bottom with the front's edge nearest.
-        let outward = self.normal[side].signum();
-        let (across, down, turned) = match side {
-            0 => (2, 1, outward),
-            1 => (0, 2, outward),
-            _ => (0, 1, -outward),
-        };
-        for place in &mut self.ring {
-            let part = |k: usize| place.at[k] / (2.0 * RADIUS * GRID);
-            place.uv = match side {
-                1 => [0.5 + part(across), 0.5 + turned * part(down)],
-                _ => [0.5 + turned * part(across), 0.5 + part(down)],
-            };
-        }
-    }
-}
-
-/// The polygons of a file, on the grid.
-#[derive(Clone, Debug, Default)]
-pub struct Polygons {
-    vertices: Vec<Vec3>,
-    /// Those with an area.
-    pub polygons: Vec<Polygon>,
-    tally: Tally,
-}
-
-impl Polygons {
-    /// Puts an OBJ's faces on the grid, the model centred and scaled to fit.
-    ///
-    /// # Errors
-    /// No face with an area, or more vertices than a mesh may have.
-    pub fn new(obj: &Obj) -> anyhow::Result<Self> {
-        ensure!(
-            !obj.faces.is_empty(),
-            "it has no faces (lines such as 'f 1 2 3'), {} vertices, and {}; export the model as \
-             polygons",
-            obj.positions.len(),
-            obj.left_out
-        );
-        let corners = obj.corners.iter();
-        let used: Vec<_> = corners
-            .map(|corner| obj.positions[corner.position as usize])
-            .collect();
-        let centre = [0, 1, 2].map(|k| {
-            let along = used.iter().map(|position| position[k]);
-            (along.clone().fold(f64::INFINITY, f64::min) + along.fold(-f64::INFINITY, f64::max))
-                / 2.0
-        });
-        let from_centre = |position: [f64; 3]| [0, 1, 2].map(|k| position[k] - centre[k]);
-        let lengths = used.iter().map(|&position| length(from_centre(position)));
-        let scale = RADIUS * GRID / lengths.fold(0.0, f64::max);
-        // y up and z towards the viewer become y down and z away: half a turn about x. A model
-        // without an extent is all in one place.
-        let on_grid = |position| {
-            let [x, y, z] =
-                from_centre(position).map(|k| if scale.is_finite() { k * scale } else { 0.0 });
-            [x, -y, -z].map(|k| k.round() as i32)
-        };
-
-        let mut this = Self::default();
-        let mut known = HashMap::new();
-        for face in &obj.faces {
-            let mut ring: Vec<_> = obj
-                .corners_of(face)
-                .iter()
-                // Counter-clockwise in the file.
-                .rev()
-                .map(|corner| {
-                    let point = on_grid(obj.positions[corner.position as usize]);
-                    let vertex = *known.entry(point).or_insert_with(|| {
-                        this.vertices.push(point);
-                        this.vertices.len() - 1
-                    });
-                    Place {
-                        vertex,
-                        at: point.map(f64::from),
-                        // v is up in the file.
-                        uv: corner.place.map_or([f64::NAN; 2], |place| {
-                            let [u, v] = obj.places[place as usize];
-                            [u, -v]
-                        }),
-                    }
-                })
-                .collect();
-            ring.dedup_by_key(|place| place.vertex);
-            while ring.len() > 1 && ring[0].vertex == ring[ring.len() - 1].vertex {
-                ring.pop();
-            }
-            let Some(normal) = normal(&ring) else {
-                this.tally.degenerate += 1;
-                continue;
-            };
-            let mut polygon = Polygon {
-                ring,
-                normal,
-                line: face.line,
-            };
-            if polygon.along(0).any(f64::is_nan) {
-                polygon.project();
-                this.tally.projected += 1;
-            }
-            this.polygons.push(polygon);
-            for (what, count, most, all) in [
-                ("faces", this.polygons.len(), MAX_FACES, obj.faces.len()),
-                (
-                    "vertices",
-                    this.vertices.len(),
-                    MAX_VERTICES,
-                    obj.positions.len(),
-                ),
-            ] {
-                if count > most {
-                    let why = format!(
-                        "with this face the model has more than {most} {what} (the file has \
-                         {all}); {SIMPLIFY}"
-                    );
-                    let line = face.line;
-                    return Err(BadLine { line, why }.into());
-                }
-            }
-        }
-        ensure!(
-            !this.polygons.is_empty(),
-            "none of its {} faces has an area; check its vertices",
-            obj.faces.len()
-        );
-        Ok(this)
-    }
-
-    /// The mesh, its places in a texture that is laid out so.
+    /// Makes the mesh of polygons, with corners placed in the texture that `layout` cuts.
     ///
     /// # Errors
     /// More faces or corners than a pack may have.
-    pub fn solid(self, layout: &Layout) -> anyhow::Result<Solid> {
-        let mut solid = Solid {
-            vertices: self.vertices,
-            tally: self.tally,
-            ..Solid::default()
+    pub fn new(polygons: Polygons, layout: &Layout) -> anyhow::Result<Self> {
+        let Polygons {
+            vertices,
+            polygons,
+            tally,
+        } = polygons;
+        let mut solid = Self {
+            vertices,
+            tally,
+            ..Self::default()
         };
         let mut ears = Ears::default();
         // Faces, if cutting leaves out no triangle.
         let mut triangles = 0;
-        for polygon in &self.polygons {
+        for polygon in &polygons {
             let places = layout.texels(polygon);
             let corners = polygon
                 .ring
@@ -316,7 +100,7 @@ impl Polygons {
                 let why = format!(
                     "with this face cut into triangles the model has more than {MAX_FACES} faces \
                      (the file has {}); {SIMPLIFY}",
-                    self.polygons.len() + self.tally.degenerate,
+                    polygons.len() + tally.degenerate,
                 );
                 let line = polygon.line;
                 return Err(BadLine { line, why }.into());
@@ -342,6 +126,33 @@ impl Polygons {
             "none of its faces can be cut into triangles; {SIMPLIFY}"
         );
         Ok(solid)
+    }
+
+    /// Finds out whether the faces were made with the other winding rule.
+    pub fn turned(&self) -> Turned {
+        let pose = Pose::at_tick(0);
+        let turn = pose.orientation();
+        let (mut inside, mut away) = (true, true);
+        let mut corners = &self.corners[..];
+        for face in &self.faces {
+            let (own, rest) = corners.split_at(face.corners.into());
+            corners = rest;
+            // Any point of its plane does; the face may be bent, so the middle of its corners.
+            let vertex = |corner: &Corner| self.vertices[usize::from(corner.vertex)];
+            let sum = own.iter().map(vertex).fold([0.0; 3], |sum, at| {
+                [0, 1, 2].map(|k| sum[k] + f64::from(at[k]))
+            });
+            let middle = sum.map(|k| k / f64::from(face.corners));
+            inside &= dot(middle, face.normal.map(f64::from)) < 0.0;
+            let seen = turn.turn(middle.map(|k| k.round() as i32)).map(f64::from);
+            let from_eye = [seen[0], seen[1], seen[2] + f64::from(pose.distance)];
+            away &= dot(from_eye, turn.turn(face.normal).map(f64::from)) >= 0.0;
+        }
+        match (inside, away) {
+            (true, _) => Turned::Inside,
+            (_, true) => Turned::Away,
+            _ => Turned::Seen,
+        }
     }
 }
 
@@ -427,41 +238,12 @@ impl Ears {
     }
 }
 
-/// The unit normal on the side from which the ring is clockwise; none if it has no area.
-fn normal(ring: &[Place]) -> Option<[f64; 3]> {
-    let mut sum = [0.0; 3];
-    // From the first corner, so that the terms are as small as the polygon is.
-    for pair in ring.windows(2).skip(1) {
-        let term = cross(minus(pair[1].at, ring[0].at), minus(pair[0].at, ring[0].at));
-        sum = [0, 1, 2].map(|k| sum[k] + term[k]);
-    }
-    let length = length(sum);
-    (length > 0.0).then(|| sum.map(|k| k / length))
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| a[k] - b[k])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    (0..3).map(|k| a[k] * b[k]).sum()
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| {
-        let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-        a[i] * b[j] - a[j] * b[i]
-    })
-}
-
-fn length(a: [f64; 3]) -> f64 {
-    dot(a, a).sqrt()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{obj, solid};
+    use crate::polygon::RADIUS;
+    use crate::vector::length;
+    use crate::{obj, solid};
 
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
                           vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5 1\n";

@@ -1,0 +1,214 @@
+//! From an OBJ's faces to polygons on the mesh's grid.
+//!
+//! The model is centred and scaled so that a ball of [`RADIUS`] contains it: at the default distance it
+//! fits the screen in every orientation. Then its points are rounded to the mesh's grid, and equal points
+//! become one vertex. Every later decision is made on the grid, because the kernel sees nothing else.
+//!
+//! # Missing texture coordinates
+//!
+//! A face without texture coordinates gets them by projection onto a box around the model's centre. The largest
+//! of its normal's three parts says which side of the box the face is on, and each side has the whole texture
+//! once. Such a face always has one texture plane and no seam, and the projection stretches by at most the square root
+//! of three.
+
+use std::collections::HashMap;
+
+use anyhow::ensure;
+use scene::{MAX_FACES, MAX_VERTICES, Vec3};
+
+use crate::obj::{BadLine, Obj, SIMPLIFY};
+use crate::vector::{cross, length, minus};
+
+/// Of the ball that holds the model, in units. From the default distance of 2.95 units its outline
+/// is 115 pixels from the screen's middle, of the 120 to the edge.
+pub const RADIUS: f64 = 1.2;
+/// One unit on the mesh's grid.
+pub(crate) const GRID: f64 = 65_536.0;
+
+/// What became of the file's faces.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Without an area: dropped.
+    pub degenerate: usize,
+    /// Not convex, not flat, of too many corners or of no one texture plane: cut into triangles.
+    pub cut: usize,
+    /// Without texture coordinates: made up.
+    pub projected: usize,
+}
+
+/// A polygon on the grid, clockwise as it is seen from its front, and with an area.
+#[derive(Clone, Debug)]
+pub struct Polygon {
+    pub(crate) ring: Vec<Place>,
+    pub(crate) normal: [f64; 3],
+    /// The line of the file that it is on.
+    pub line: usize,
+}
+
+/// A corner of a polygon.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    pub(crate) vertex: usize,
+    /// On the mesh's grid.
+    pub(crate) at: [f64; 3],
+    /// In whole textures, to the right and down.
+    uv: [f64; 2],
+}
+
+impl Polygon {
+    /// Where its corners are in the texture, in whole textures: to the right, or down.
+    pub fn along(&self, axis: usize) -> impl Iterator<Item = f64> {
+        self.ring.iter().map(move |place| place.uv[axis])
+    }
+
+    /// Makes up its texture coordinates.
+    fn project(&mut self) {
+        let side = (0..3).fold(0, |a, b| {
+            if self.normal[b].abs() > self.normal[a].abs() {
+                b
+            } else {
+                a
+            }
+        });
+        // What is to the right and down on that side of the box as one looks at it from outside:
+        // the top and the bottom with the front's edge nearest.
+        let outward = self.normal[side].signum();
+        let (across, down, turned) = match side {
+            0 => (2, 1, outward),
+            1 => (0, 2, outward),
+            _ => (0, 1, -outward),
+        };
+        for place in &mut self.ring {
+            let part = |k: usize| place.at[k] / (2.0 * RADIUS * GRID);
+            place.uv = match side {
+                1 => [0.5 + part(across), 0.5 + turned * part(down)],
+                _ => [0.5 + turned * part(across), 0.5 + part(down)],
+            };
+        }
+    }
+}
+
+/// The polygons of a file, on the grid.
+#[derive(Clone, Debug, Default)]
+pub struct Polygons {
+    pub(crate) vertices: Vec<Vec3>,
+    /// Those with an area.
+    pub polygons: Vec<Polygon>,
+    pub(crate) tally: Tally,
+}
+
+impl Polygons {
+    /// Puts an OBJ's faces on the grid, the model centred and scaled to fit.
+    ///
+    /// # Errors
+    /// No face with an area, or more vertices than a mesh may have.
+    pub fn new(obj: &Obj) -> anyhow::Result<Self> {
+        ensure!(
+            !obj.faces.is_empty(),
+            "it has no faces (lines such as 'f 1 2 3'), {} vertices, and {}; export the model as \
+             polygons",
+            obj.positions.len(),
+            obj.left_out
+        );
+        let corners = obj.corners.iter();
+        let used: Vec<_> = corners
+            .map(|corner| obj.positions[corner.position as usize])
+            .collect();
+        let centre = [0, 1, 2].map(|k| {
+            let along = used.iter().map(|position| position[k]);
+            (along.clone().fold(f64::INFINITY, f64::min) + along.fold(-f64::INFINITY, f64::max))
+                / 2.0
+        });
+        let from_centre = |position: [f64; 3]| [0, 1, 2].map(|k| position[k] - centre[k]);
+        let lengths = used.iter().map(|&position| length(from_centre(position)));
+        let scale = RADIUS * GRID / lengths.fold(0.0, f64::max);
+        // y up and z towards the viewer become y down and z away: half a turn about x. A model
+        // without an extent is all in one place.
+        let on_grid = |position| {
+            let [x, y, z] =
+                from_centre(position).map(|k| if scale.is_finite() { k * scale } else { 0.0 });
+            [x, -y, -z].map(|k| k.round() as i32)
+        };
+
+        let mut this = Self::default();
+        let mut known = HashMap::new();
+        for face in &obj.faces {
+            let mut ring: Vec<_> = obj
+                .corners_of(face)
+                .iter()
+                // Counter-clockwise in the file.
+                .rev()
+                .map(|corner| {
+                    let point = on_grid(obj.positions[corner.position as usize]);
+                    let vertex = *known.entry(point).or_insert_with(|| {
+                        this.vertices.push(point);
+                        this.vertices.len() - 1
+                    });
+                    Place {
+                        vertex,
+                        at: point.map(f64::from),
+                        // v is up in the file.
+                        uv: corner.place.map_or([f64::NAN; 2], |place| {
+                            let [u, v] = obj.places[place as usize];
+                            [u, -v]
+                        }),
+                    }
+                })
+                .collect();
+            ring.dedup_by_key(|place| place.vertex);
+            while ring.len() > 1 && ring[0].vertex == ring[ring.len() - 1].vertex {
+                ring.pop();
+            }
+            let Some(normal) = normal(&ring) else {
+                this.tally.degenerate += 1;
+                continue;
+            };
+            let mut polygon = Polygon {
+                ring,
+                normal,
+                line: face.line,
+            };
+            if polygon.along(0).any(f64::is_nan) {
+                polygon.project();
+                this.tally.projected += 1;
+            }
+            this.polygons.push(polygon);
+            for (what, count, most, all) in [
+                ("faces", this.polygons.len(), MAX_FACES, obj.faces.len()),
+                (
+                    "vertices",
+                    this.vertices.len(),
+                    MAX_VERTICES,
+                    obj.positions.len(),
+                ),
+            ] {
+                if count > most {
+                    let why = format!(
+                        "with this face the model has more than {most} {what} (the file has \
+                         {all}); {SIMPLIFY}"
+                    );
+                    let line = face.line;
+                    return Err(BadLine { line, why }.into());
+                }
+            }
+        }
+        ensure!(
+            !this.polygons.is_empty(),
+            "none of its {} faces has an area; check its vertices",
+            obj.faces.len()
+        );
+        Ok(this)
+    }
+}
+
+/// The unit normal on the side from which the ring is clockwise; none if it has no area.
+fn normal(ring: &[Place]) -> Option<[f64; 3]> {
+    let mut sum = [0.0; 3];
+    // From the first corner, so that the terms are as small as the polygon is.
+    for pair in ring.windows(2).skip(1) {
+        let term = cross(minus(pair[1].at, ring[0].at), minus(pair[0].at, ring[0].at));
+        sum = [0, 1, 2].map(|k| sum[k] + term[k]);
+    }
+    let length = length(sum);
+    (length > 0.0).then(|| sum.map(|k| k / length))
+}
