@@ -13,10 +13,10 @@ use std::sync::LazyLock;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crystal_ball::card::{self, Card, Emulated};
-use crystal_ball::machine::{Config, Limits, Machine, Verdict};
+use frames::card::{self, Card, Emulated};
 use link::{Action, Change, Command, Content, Fault, Picture};
 use modex::registers::MODE_X;
+use qemu::{Config, Limits, Machine, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::judged::{Judged, verdict};

@@ -5,9 +5,9 @@ use std::io::Cursor;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
-use crystal_ball::dump::Dump;
-use crystal_ball::indexed::Indexed;
-use crystal_ball::screen::Screen;
+use frames::dump::Dump;
+use frames::indexed::Indexed;
+use frames::screen::Screen;
 use link::dump::{Header, PLANE_BYTES};
 use link::{Content, Picture, Word};
 use tempfile::TempDir;

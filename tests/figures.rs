@@ -2,10 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use crystal_ball::card::{self, Card, Emulated};
-use crystal_ball::golden::{self, Findings, Golden, Transfer};
-use crystal_ball::machine::{Config, Machine};
+use crystal_ball::golden_folder;
+use frames::card::{self, Card, Emulated};
+use frames::golden::{self, Findings, Golden, Transfer};
 use link::{Command, Content, Picture};
+use qemu::{Config, Machine};
 use setup::Options;
 
 use crate::ready;
@@ -21,7 +22,7 @@ fn figures() {
     let options = Options::default();
     let ready = ready::with(&options);
     let config = Config::new(&ready);
-    let goldens = golden::find(&golden::folder()).expect("golden frames");
+    let goldens = golden::find(&golden_folder()).expect("golden frames");
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).expect("an emulated card");
     let (mut set_ups, mut kernels, mut pictures) = (Vec::new(), Vec::new(), Vec::new());

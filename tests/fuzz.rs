@@ -13,8 +13,8 @@ use std::io::Cursor;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crystal_ball::indexed::Indexed;
 use fastrand::Rng;
+use frames::indexed::Indexed;
 use import::{Model, obj, solid, texture};
 use in_place::InPlace;
 use modex::PlanarBuffer;

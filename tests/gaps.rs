@@ -10,7 +10,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use crystal_ball::indexed::Indexed;
+use frames::indexed::Indexed;
 use modex::{Destination, HEIGHT, Lane, PlanarBuffer, STRIDE, WIDTH};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, Mapper, Order, Renderer, Texture, Vertex};

@@ -1,5 +1,5 @@
 //! Golden frames, each on four witnesses: QEMU's card, the emulated card, the committed picture,
-//! and QEMU's screen. `crystal_ball::golden` says what is compared.
+//! and QEMU's screen. `frames::golden` says what is compared.
 //!
 //! Findings are collected over all goldens before the verdict, and a report shows them
 //! (`target/crystal-ball/golden/report.html`).
@@ -9,11 +9,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command as Process;
 use std::sync::LazyLock;
 
-use crystal_ball::card::{self, Card, Emulated};
-use crystal_ball::diff::Subject;
-use crystal_ball::golden::{self, Findings, Golden, Transfer};
-use crystal_ball::machine::{Config, Machine};
+use crystal_ball::golden_folder;
+use frames::card::{self, Card, Emulated};
+use frames::difference::Subject;
+use frames::golden::{self, Findings, Golden, Transfer};
 use link::{Command, Content, Picture};
+use qemu::{Config, Machine};
 use setup::Ready;
 use tempfile::TempDir;
 use vga::Access;
@@ -21,7 +22,7 @@ use vga::Access;
 use crate::ready::{READY, config};
 
 pub fn goldens() -> Vec<Golden> {
-    golden::find(&golden::folder()).expect("the golden frames")
+    golden::find(&golden_folder()).expect("the golden frames")
 }
 
 /// Where a test leaves its report if it fails.
@@ -221,7 +222,7 @@ fn counted_instructions_change_no_byte() {
 fn two_goldens() -> TempDir {
     let copy = tempfile::tempdir().unwrap();
     for name in ["belt.toml", "belt.png", "north.toml", "north.png"] {
-        std::fs::copy(golden::folder().join(name), copy.path().join(name)).unwrap();
+        std::fs::copy(golden_folder().join(name), copy.path().join(name)).unwrap();
     }
     copy
 }

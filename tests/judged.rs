@@ -1,6 +1,6 @@
 //! Runs that must not go well.
 
-use crystal_ball::machine::Failure;
+use qemu::Failure;
 
 /// A failure whose evidence goes when the test has ended well, and stays when it has not.
 pub struct Judged(pub Failure);

@@ -10,10 +10,10 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::Duration;
 
-use crystal_ball::card::{self, Card, Emulated};
-use crystal_ball::dump::Dump;
-use crystal_ball::machine::{Config, Limits, Machine, Verdict};
+use frames::card::{self, Card, Emulated};
+use frames::dump::Dump;
 use link::{Command, Content, Picture};
+use qemu::{Config, Limits, Machine, Verdict};
 
 use crate::judged::{Judged, verdict};
 use crate::ready::config;

@@ -2,11 +2,11 @@
 
 use std::fs;
 
-use crystal_ball::card::{self, Card, Emulated};
-use crystal_ball::machine::{Config, Machine};
-use crystal_ball::screen::Screen;
+use frames::card::{self, Card, Emulated};
+use frames::screen::Screen;
 use import::Model;
 use link::{Command, Content, Picture, Setting, Word};
+use qemu::{Config, Machine};
 use setup::Options;
 use tempfile::TempDir;
 
@@ -100,8 +100,8 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
 /// Both cards, in one list.
 trait Asked {
     fn asked(&mut self, command: Command) -> Vec<String>;
-    fn dumped(&mut self) -> crystal_ball::dump::Dump;
-    fn dump_of(&mut self, picture: Picture) -> crystal_ball::dump::Dump {
+    fn dumped(&mut self) -> frames::dump::Dump;
+    fn dump_of(&mut self, picture: Picture) -> frames::dump::Dump {
         self.asked(Command::Hold);
         self.asked(Command::Show(picture));
         self.dumped()
@@ -113,7 +113,7 @@ impl<C: Card> Asked for C {
         self.ask(command).unwrap()
     }
 
-    fn dumped(&mut self) -> crystal_ball::dump::Dump {
+    fn dumped(&mut self) -> frames::dump::Dump {
         self.dump(Content::Page).unwrap()
     }
 }

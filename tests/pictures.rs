@@ -3,7 +3,8 @@
 
 use std::fmt;
 
-use crystal_ball::golden::{self, Golden};
+use crystal_ball::golden_folder;
+use frames::golden::{self, Golden};
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::coverage::inside;
 use oracle::depth;
@@ -164,7 +165,7 @@ fn every_golden_is_what_the_oracle_draws() {
     let mut storage = in_place::boxed!(Storage);
     let mut stage = Stage::new(&mut storage, CATALOGUE[0].scene(&textures));
     let mut between = 0;
-    for golden in golden::find(&golden::folder()).unwrap() {
+    for golden in golden::find(&golden_folder()).unwrap() {
         let entry = scene(&golden);
         let mut texels = Box::new([0; MAX_TEXELS]);
         stage.set(entry.scene(&entry.paint(&mut texels)));
@@ -214,7 +215,7 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
         compared.unwrap_or_else(|wrong| panic!("{wrong}: {pose:?}"))
     };
     let mut far = Compared::default();
-    let mut goldens = golden::find(&golden::folder()).unwrap();
+    let mut goldens = golden::find(&golden_folder()).unwrap();
     goldens.retain(|golden| scene(golden).name == "ball");
     for golden in goldens.iter().take(seeded::cases(goldens.len())) {
         far += compare(&ball, &pose(golden));

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::sync::LazyLock;
 
-use crystal_ball::machine::Config;
+use qemu::Config;
 use setup::{Options, Ready};
 
 /// What every boot needs.

@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
-use crystal_ball::diff::Subject;
-use crystal_ball::indexed::Indexed;
+use frames::difference::Subject;
+use frames::indexed::Indexed;
 use vga::widen;
 
 use crate::ready::READY;

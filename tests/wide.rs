@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use std::thread;
 
 use anyhow::{Context, bail, ensure};
-use crystal_ball::machine::Failure;
+use qemu::Failure;
 use setup::{Options, Ready};
 
 use crate::golden::{agrees, emulated_evidence, evidence, few, goldens, with_arguments};

@@ -1,17 +1,12 @@
-//! The host program of Crystal Ball: set-up, disk image, QEMU and its verdict.
+//! The `crystal-ball` command: what accuracy costs, and the window.
 
-pub mod card;
-pub mod diff;
-pub mod dump;
-pub mod frames;
-pub mod golden;
-pub mod indexed;
-pub mod look;
-pub mod machine;
 pub mod measure;
-pub mod record;
-pub mod replay;
-pub mod report;
-pub mod screen;
 pub mod trade;
 pub mod window;
+
+use std::path::PathBuf;
+
+/// Returns the folder of the workspace's golden frames.
+pub fn golden_folder() -> PathBuf {
+    setup::root().join("tests").join("golden")
+}

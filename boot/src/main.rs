@@ -9,15 +9,16 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use crystal_ball::card::{self, Card, Emulated};
-use crystal_ball::diff;
-use crystal_ball::frames::Frames;
-use crystal_ball::golden;
-use crystal_ball::look::{Look, Named};
-use crystal_ball::machine::{Config, Failure, Machine, Printed, Verdict};
-use crystal_ball::{record, replay, trade, window};
+use crystal_ball::{trade, window};
+use frames::card::{self, Card, Emulated};
+use frames::comparison;
+use frames::golden;
+use frames::look::{Look, Named};
+use frames::write::Frames;
+use frames::{record, replay};
 use import::{Files, Model};
 use link::{Action, Change, Command};
+use qemu::{Config, Failure, Machine, Printed, Verdict};
 use scene::catalogue::Entry;
 use setup::{Options, Ready};
 use system::quote::printable;
@@ -408,10 +409,10 @@ fn run(cli: Cli) -> anyhow::Result<ExitCode> {
         Some(Subcommands::Replay(replay)) => replay.run(tell_path)?,
         Some(Subcommands::Diff { a, b, report }) => return compare(&a, &b, report.as_deref()),
         Some(Subcommands::Bless { folder }) => {
-            let folder = folder.unwrap_or_else(golden::folder);
+            let folder = folder.unwrap_or_else(crystal_ball::golden_folder);
             let report = setup::folder().join("bless").join("report.html");
             let boot = || Machine::boot(&Config::new(&setup::ready(&options)?));
-            match golden::bless(&folder, &report, boot, |line| say(line))? {
+            match golden::bless(&folder, &report, boot, Machine::leave, |line| say(line))? {
                 0 => say("nothing to bless: every golden frame is as it was"),
                 count => say(format_args!(
                     "{count} golden frames blessed in {}",
@@ -564,10 +565,10 @@ fn watch(ready: &Ready, config: Config, headless: bool, look: &Look) -> anyhow::
 
 /// Here 1 means that something differs: an error is 2, as for `diff` and `cmp`.
 fn compare(a: &Path, b: &Path, report: Option<&Path>) -> anyhow::Result<ExitCode> {
-    let outcome = match diff::run(a, b, report, &mut Output) {
+    let outcome = match comparison::run(a, b, report, &mut Output) {
         Err(error) if !error.is::<Interrupted>() => {
             say(format_args!("error: {error:#}"));
-            diff::Outcome::Incomparable
+            comparison::Outcome::Incomparable
         }
         outcome => outcome?,
     };

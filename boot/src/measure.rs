@@ -14,7 +14,7 @@ use cost::{Ask, Figure, LENGTHS, MAX_ROUNDS, Work};
 use link::OK;
 use texmap::{Mapper, Order};
 
-use crate::machine::{self, Machine};
+use qemu::Machine;
 use setup::{Options, Ready};
 use system::Step;
 
@@ -246,7 +246,7 @@ pub struct RunCost {
 /// Builds the measuring kernel if need be, boots it, and measures what `config` asks for.
 ///
 /// # Errors
-/// As [`setup::ready`]; a [`machine::Failure`]; figures that do not repeat under `-icount`, and
+/// As [`setup::ready`]; a [`qemu::Failure`]; figures that do not repeat under `-icount`, and
 /// pictures that differ from those of the emulated card.
 pub fn run(config: &Config) -> anyhow::Result<Measured> {
     ensure!(
@@ -310,9 +310,9 @@ impl Guest {
         let arguments = ["-cpu", cpu.name()]
             .into_iter()
             .chain(arguments.iter().copied());
-        let machine = Machine::boot(&machine::Config {
+        let machine = Machine::boot(&qemu::Config {
             arguments: arguments.map(Into::into).collect(),
-            ..machine::Config::new(ready)
+            ..qemu::Config::new(ready)
         })?;
         Ok(Self { machine })
     }

@@ -8,10 +8,11 @@ use texmap::Mapper;
 use super::accuracy::{self, Accuracy, Jobs};
 use super::subject::Subject;
 use super::table::{decibels, percent, texels};
-use crate::indexed::Indexed;
-use crate::screen::Screen;
+use frames::indexed::Indexed;
+use frames::screen::Screen;
 
-const STYLE: &str = concat!(include_str!("../report.css"), include_str!("page.css"));
+/// What this page adds to the style sheet of the reports.
+const STYLE: &str = include_str!("page.css");
 
 /// The errors that the maps' colours tell apart, as powers of two of a texel.
 const HEAT: (f64, f64) = (-8.0, 5.0);
@@ -178,10 +179,11 @@ impl Page<'_> {
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <title>What accuracy costs - Crystal Ball</title>\n<style>\n{STYLE}</style>\n</head>\n\
+             <title>What accuracy costs - Crystal Ball</title>\n<style>\n{}{STYLE}</style>\n</head>\n\
              <body class=\"trade\">\n<header class=\"top\">\n\
              <p class=\"brand\">Crystal Ball <span>trade</span></p>\n\
-             <h1>What accuracy costs</h1>\n"
+             <h1>What accuracy costs</h1>\n",
+            frames::report::STYLE
         );
         for line in self.about {
             let _ = writeln!(page, "<p>{}</p>", escape(line));

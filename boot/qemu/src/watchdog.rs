@@ -22,7 +22,7 @@ const AT_MOST: u32 = 15;
 
 /// Waiting for one thing.
 #[derive(Debug)]
-pub struct Patience {
+pub struct Watchdog {
     process: Pid,
     limit: Duration,
     began: Instant,
@@ -31,7 +31,7 @@ pub struct Patience {
     looked: (Instant, Duration),
 }
 
-impl Patience {
+impl Watchdog {
     /// Waits until QEMU has worked for `limit`, or has idled when `limit` has passed.
     pub fn new(process: Pid, limit: Duration) -> Self {
         let (now, used) = (Instant::now(), processor_time(process));
@@ -146,16 +146,16 @@ mod tests {
     }
 
     #[test]
-    fn work_uses_patience_up() {
-        let mut patience = Patience::new(rustix::process::getpid(), Duration::from_millis(200));
-        assert!(!patience.is_over());
+    fn work_uses_watchdog_up() {
+        let mut watchdog = Watchdog::new(rustix::process::getpid(), Duration::from_millis(200));
+        assert!(!watchdog.is_over());
         let begun = Instant::now();
-        while !patience.is_over() {
+        while !watchdog.is_over() {
             assert!(begun.elapsed() < Duration::from_secs(20));
         }
         assert!(begun.elapsed() >= Duration::from_millis(90));
-        patience.renew();
-        assert!(!patience.is_over());
+        watchdog.renew();
+        assert!(!watchdog.is_over());
     }
 
     #[test]
@@ -172,9 +172,9 @@ mod tests {
         while processor_time(process).is_zero() {
             std::thread::yield_now();
         }
-        let mut patience = Patience::new(process, Duration::from_secs(60));
+        let mut watchdog = Watchdog::new(process, Duration::from_secs(60));
         drop(child.stdin.take());
         child.wait().unwrap();
-        assert!(!patience.is_over());
+        assert!(!watchdog.is_over());
     }
 }

@@ -12,7 +12,8 @@ use clap::builder::RangedU64ValueParser;
 use console::Term;
 use scene::font;
 
-use crate::diff::{Subject, list};
+use crate::comparison::list;
+use crate::difference::Subject;
 use crate::indexed::Indexed;
 use crate::screen::Screen;
 use system::Step;

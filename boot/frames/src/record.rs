@@ -17,10 +17,9 @@ use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use link::{Command, Content, Picture, TICKS_PER_SECOND};
 
 use crate::card::{Card, Emulated};
-use crate::frames::range;
 use crate::indexed::Indexed;
 use crate::look::Look;
-use crate::machine::Machine;
+use crate::write::range;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
@@ -82,7 +81,7 @@ impl Options {
     /// When a card fails or a file can't be written. A GIF is whole or not there; so is each PNG.
     pub fn record(
         &self,
-        machine: &mut Machine,
+        machine: &mut impl Card,
         emulated: &mut Emulated<'_>,
         look: &Look,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
@@ -150,7 +149,7 @@ fn centiseconds(ticks: u64) -> u64 {
 
 /// What QEMU's card holds when it shows `picture`.
 fn seen(
-    machine: &mut Machine,
+    machine: &mut impl Card,
     emulated: &mut Emulated<'_>,
     picture: Picture,
 ) -> anyhow::Result<Indexed> {

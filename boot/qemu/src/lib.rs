@@ -13,10 +13,10 @@
 //! feed one channel; everything is decided on the caller's thread.
 
 mod command;
-mod patience;
 mod qmp;
 mod run;
 mod verdict;
+mod watchdog;
 
 use std::ffi::OsString;
 use std::fs::File;
@@ -34,15 +34,15 @@ use rustix::fs::MemfdFlags;
 use rustix::process::{Pid, Signal, kill_process_group};
 use serde_json::{Value, json};
 
-use patience::Patience;
 use qmp::Control;
 use run::{Act, Event, Run};
 use verdict::Evidence;
 pub use verdict::{Failure, Found, Verdict};
+use watchdog::Watchdog;
 
-use crate::card::Card;
-use crate::dump::Dump;
-use crate::screen::Screen;
+use frames::card::Card;
+use frames::dump::Dump;
+use frames::screen::Screen;
 use setup::Ready;
 use system::quote::quoted;
 use system::{Interrupted, interrupted};
@@ -131,7 +131,7 @@ pub struct Machine {
     failures: PathBuf,
     limits: Limits,
     /// QEMU's time to end, once the machine is off.
-    ending: Option<Patience>,
+    ending: Option<Watchdog>,
     run: Run,
 }
 
@@ -207,9 +207,9 @@ impl Machine {
         };
         machine.run.asked_for_list = config.arguments.iter().any(|word| word == "help");
         machine.negotiate()?;
-        let mut patience = Patience::new(machine.process, config.limits.boot);
+        let mut watchdog = Watchdog::new(machine.process, config.limits.boot);
         while !machine.run.hello {
-            if !machine.pump_or_wait(&mut patience)? {
+            if !machine.pump_or_wait(&mut watchdog)? {
                 let reset = machine.run.was_reset();
                 let found = Found::default();
                 return Err(machine.fail(Verdict::BootLoader { reset, found }));
@@ -223,9 +223,9 @@ impl Machine {
 
     /// Waits until the kernel has taken the pack of this checksum.
     fn wait_for_pack(&mut self, pack: u32) -> anyhow::Result<()> {
-        let mut patience = Patience::new(self.process, self.limits.answer);
+        let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         while self.run.pack.is_none() {
-            if !self.pump_or_wait(&mut patience)? {
+            if !self.pump_or_wait(&mut watchdog)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: "what the kernel says of the model".into(),
                 }));
@@ -255,14 +255,14 @@ impl Machine {
     /// # Errors
     /// A [`Failure`].
     pub fn wait_until_running(&mut self) -> anyhow::Result<()> {
-        let mut patience = Patience::new(self.process, self.limits.answer);
+        let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         while self
             .run
             .lines
             .pop_front()
             .is_none_or(|line| line != RUNNING)
         {
-            if self.run.lines.is_empty() && !self.pump_or_wait(&mut patience)? {
+            if self.run.lines.is_empty() && !self.pump_or_wait(&mut watchdog)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: "the first picture".into(),
                 }));
@@ -293,17 +293,17 @@ impl Machine {
     /// # Errors
     /// A [`Failure`]; a hang if the kernel does not read for too long.
     pub fn send_raw(&mut self, mut bytes: &[u8]) -> anyhow::Result<()> {
-        let mut patience = Patience::new(self.process, self.limits.answer);
+        let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         while !bytes.is_empty() {
             match self.serial.write(bytes) {
                 Ok(count) => {
                     bytes = &bytes[count..];
-                    patience.renew();
+                    watchdog.renew();
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
                     self.pump(Instant::now())?;
-                    if self.is_over(&mut patience) {
+                    if self.is_over(&mut watchdog) {
                         return Err(self.fail(Verdict::Hang {
                             waited_for: "the kernel's reading of what it is sent".into(),
                         }));
@@ -336,7 +336,7 @@ impl Machine {
     /// # Errors
     /// A [`Failure`]; a hang if no answer comes in time.
     pub fn answer(&mut self, asked: &str) -> anyhow::Result<Vec<String>> {
-        let mut patience = Patience::new(self.process, self.limits.answer);
+        let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         let mut answer = Vec::new();
         loop {
             while let Some(line) = self.run.lines.pop_front() {
@@ -349,7 +349,7 @@ impl Machine {
                     return Ok(answer);
                 }
             }
-            if !self.pump_or_wait(&mut patience)? {
+            if !self.pump_or_wait(&mut watchdog)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: format!("the answer to '{asked}'"),
                 }));
@@ -421,9 +421,9 @@ impl Machine {
     }
 
     fn run_to_the_end(&mut self) -> anyhow::Result<()> {
-        let mut patience = Patience::new(self.process, self.limits.answer);
+        let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         loop {
-            match self.pump_or_wait(&mut patience) {
+            match self.pump_or_wait(&mut watchdog) {
                 Ok(true) => {}
                 Ok(false) => {
                     return Err(self.fail(Verdict::Hang {
@@ -446,14 +446,14 @@ impl Machine {
                 return Err(error).context("QEMU's control socket is closed");
             }
         };
-        let mut patience = Patience::new(self.process, self.limits.answer);
+        let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         loop {
             while let Some(reply) = self.run.replies.pop_front() {
                 if qmp::is_reply(&reply, id) {
                     return Ok(reply);
                 }
             }
-            if !self.pump_or_wait(&mut patience)? {
+            if !self.pump_or_wait(&mut watchdog)? {
                 let mut words = self.run.words.clone();
                 words.push(format!("(it does not answer '{execute}')"));
                 let status = self.run.ended;
@@ -470,26 +470,26 @@ impl Machine {
         Ok(())
     }
 
-    /// Takes in one event. False when `patience` is over before there was one, or when events have
+    /// Takes in one event. False when `watchdog` is over before there was one, or when events have
     /// come for far longer than that.
-    fn pump_or_wait(&mut self, patience: &mut Patience) -> anyhow::Result<bool> {
+    fn pump_or_wait(&mut self, watchdog: &mut Watchdog) -> anyhow::Result<bool> {
         while !self.pump(Instant::now() + LOOK_UP)? {
-            if self.is_over(patience) {
+            if self.is_over(watchdog) {
                 return Ok(false);
             }
         }
-        Ok(!patience.is_past_ceiling())
+        Ok(!watchdog.is_past_ceiling())
     }
 
-    /// Whether `patience` is over. A user's pause, as QEMU's window can make one, suspends it, but
+    /// Whether `watchdog` is over. A user's pause, as QEMU's window can make one, suspends it, but
     /// has a limit of its own.
-    fn is_over(&self, patience: &mut Patience) -> bool {
+    fn is_over(&self, watchdog: &mut Watchdog) -> bool {
         match self.run.paused {
             Some(since) => {
-                patience.renew();
+                watchdog.renew();
                 since.elapsed() >= self.limits.pause
             }
-            None => patience.is_over(),
+            None => watchdog.is_over(),
         }
     }
 
@@ -502,7 +502,7 @@ impl Machine {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            if self.ending.as_mut().is_some_and(Patience::is_over) {
+            if self.ending.as_mut().is_some_and(Watchdog::is_over) {
                 self.end();
             }
             if self.run.is_decided() {
@@ -529,7 +529,7 @@ impl Machine {
         match self.run.take(event) {
             Some(Act::Quit) => {
                 let _ = self.control.send("quit", json!({}));
-                self.ending = Some(Patience::new(self.process, self.limits.answer));
+                self.ending = Some(Watchdog::new(self.process, self.limits.answer));
             }
             Some(Act::AskStatus) => {
                 let _ = self.control.send("query-status", json!({}));

@@ -40,10 +40,9 @@ use serde::Deserialize;
 use texmap::{Mapper, Order};
 
 use crate::card::{self, Card, Emulated};
-use crate::diff::{Difference, Subject, compare};
+use crate::difference::{Difference, Subject, compare};
 use crate::indexed::Indexed;
 use crate::look::{Look, Named};
-use crate::machine::Machine;
 use crate::report::Report;
 use crate::screen::Screen;
 use system::Step;
@@ -74,11 +73,6 @@ struct Description {
     scene: Option<String>,
     mapper: Option<String>,
     order: Option<String>,
-}
-
-/// The workspace's golden frames.
-pub fn folder() -> PathBuf {
-    setup::root().join("tests").join("golden")
 }
 
 /// The goldens of a folder by name.
@@ -259,7 +253,7 @@ impl Findings {
         &mut self,
         golden: &Golden,
         emulated: &mut Emulated<'_>,
-        machine: &mut Machine,
+        machine: &mut impl Card,
         transfer: Transfer,
     ) -> anyhow::Result<()> {
         emulated.show_as(&golden.look, &golden.show)?;
@@ -300,7 +294,7 @@ impl Findings {
         &mut self,
         golden: &Golden,
         emulated: &mut Emulated<'_>,
-        machine: &mut Machine,
+        machine: &mut impl Card,
     ) -> anyhow::Result<bool> {
         // From outside the emulated card: the program that runs on both cards has no part in it.
         let expected = emulated.dump(Content::Memory)?.checksums();
@@ -327,7 +321,7 @@ impl Findings {
         golden: &Golden,
         content: Content,
         emulated: &mut Emulated<'_>,
-        machine: &mut Machine,
+        machine: &mut impl Card,
     ) -> anyhow::Result<()> {
         let expected = Subject::Dump(emulated.dump(content)?);
         let got = Subject::Dump(machine.dump(content)?);
@@ -430,10 +424,11 @@ fn difference(expected: &Screen, got: &Screen) -> Option<String> {
 ///
 /// # Errors
 /// When a card fails, QEMU's card differs (then nothing is written), or a file can't be written.
-pub fn bless(
+pub fn bless<C: Card>(
     folder: &Path,
     report: &Path,
-    boot: impl FnOnce() -> anyhow::Result<Machine>,
+    boot: impl FnOnce() -> anyhow::Result<C>,
+    leave: impl FnOnce(C) -> anyhow::Result<()>,
     mut say: impl FnMut(&str),
 ) -> anyhow::Result<usize> {
     let mut memory = card::memory();
@@ -473,7 +468,7 @@ pub fn bless(
         step.at(done);
     }
     drop(step);
-    machine.leave()?;
+    leave(machine)?;
     disagree
         .verdict(&report.with_file_name("disagreement").join("report.html"))
         .context("QEMU does not agree, so nothing was blessed")?;

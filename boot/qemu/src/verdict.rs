@@ -9,7 +9,7 @@ use std::process::ExitStatus;
 use std::time::SystemTime;
 
 use super::command::{names_accelerator, option};
-use crate::screen::Screen;
+use frames::screen::Screen;
 
 /// The memory that the image boots with on every QEMU tried: 7.2 needs 25 MiB, 10 and later up to
 /// 32.

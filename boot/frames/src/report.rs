@@ -17,14 +17,15 @@ use anyhow::Context;
 use link::Content;
 use modex::Rgb6;
 
-use crate::diff::{Bounds, Colour, Difference, Shape, Subject, colour, differing_entries};
+use crate::difference::{Bounds, Colour, Difference, Shape, Subject, colour, differing_entries};
 use crate::dump::Dump;
 use crate::indexed::Indexed;
 use crate::screen::Screen;
 use system::write_atomically;
 use vga::widen;
 
-const STYLE: &str = include_str!("report.css");
+/// The style sheet of every page that this project writes.
+pub const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
 
 /// How many times as large as they are the pictures are shown, where there is room.
@@ -684,7 +685,7 @@ fn url(name: &OsStr) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::diff::compare;
+    use crate::difference::compare;
 
     fn picture(pixels: &[u8]) -> Indexed {
         Indexed {

@@ -1,0 +1,252 @@
+//! `diff`: two files or two folders of dumps and indexed PNGs.
+//!
+//! Nothing passes by luck: a file that cannot be compared, a file that one folder lacks, and a comparison of
+//! nothing have an outcome of their own, apart from "equal" and "different".
+
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use system::{Interrupted, interrupted, quote, say};
+
+use crate::difference::{Subject, compare};
+use crate::report::Report;
+
+/// Endings of the files that are looked for in a folder.
+const ENDINGS: [&str; 2] = ["dump", "png"];
+
+/// How a comparison ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Outcome {
+    /// All is equal.
+    Equal,
+    /// Something differs.
+    Different,
+    /// Something could not be compared.
+    Incomparable,
+}
+
+impl Outcome {
+    /// The exit code, as `diff` and `cmp` have it.
+    pub fn exit_code(self) -> u8 {
+        match self {
+            Self::Equal => 0,
+            Self::Different => 1,
+            Self::Incomparable => 2,
+        }
+    }
+}
+
+/// Compares two files or two folders, and tells what differs on `out`; what could not be compared
+/// goes to standard error. With `report` it is shown in an HTML file, too.
+///
+/// # Errors
+/// When `out` or the report can't be written, or the user stopped it.
+pub fn run(
+    a: &Path,
+    b: &Path,
+    report: Option<&Path>,
+    out: &mut impl Write,
+) -> anyhow::Result<Outcome> {
+    let mut findings = Findings {
+        report: report.map(|_| Report::between(a, b)),
+        out,
+        pairs: 0,
+        different: 0,
+        incomparable: 0,
+        pixels: 0,
+    };
+    match (a.is_dir(), b.is_dir()) {
+        (true, true) => findings.folders(a, b)?,
+        (false, false) => findings.files(a, b)?,
+        (a_is_folder, _) => {
+            let (folder, other) = if a_is_folder { (a, b) } else { (b, a) };
+            let why = match other.metadata() {
+                Ok(_) => format!(
+                    "{} is a folder and {} is none; give two files or two folders",
+                    quote::path(folder),
+                    quote::path(other)
+                ),
+                Err(error) => format!("{}: it cannot be read: {error}", quote::path(other)),
+            };
+            findings.incomparable(&quote::path(other), &why);
+        }
+    }
+    let outcome = findings.outcome();
+    if let (Some(html), Some(report)) = (report, findings.report) {
+        report.write(html)?;
+        say(format_args!("the report: {}", html.display()));
+    }
+    Ok(outcome)
+}
+
+/// What a comparison has found so far.
+struct Findings<'a, W> {
+    /// If one is asked for: it keeps what differs.
+    report: Option<Report>,
+    out: &'a mut W,
+    pairs: usize,
+    different: usize,
+    incomparable: usize,
+    pixels: usize,
+}
+
+impl<W: Write> Findings<'_, W> {
+    fn files(&mut self, a: &Path, b: &Path) -> anyhow::Result<()> {
+        let (from, to) = (quote::path(a), quote::path(b));
+        let name = match (a.file_name(), b.file_name()) {
+            (Some(a), Some(b)) if a != b => {
+                format!(
+                    "{} and {}",
+                    quote::path(a.as_ref()),
+                    quote::path(b.as_ref())
+                )
+            }
+            (_, Some(b)) => quote::path(b.as_ref()),
+            (_, None) => to.clone(),
+        };
+        let differs = format!("{to} differs from {from}");
+        self.pair(&name, &differs, &format!("{from} and {to}"), a, b)?;
+        if self.outcome() == Outcome::Equal {
+            writeln!(self.out, "equal: {from} and {to}, {} pixels", self.pixels)?;
+        }
+        Ok(())
+    }
+
+    fn folders(&mut self, a: &Path, b: &Path) -> anyhow::Result<()> {
+        let mut names = [BTreeSet::new(), BTreeSet::new()];
+        for (names, folder) in names.iter_mut().zip([a, b]) {
+            match list(folder) {
+                Ok(list) => *names = list,
+                Err(error) => {
+                    let folder = quote::path(folder);
+                    let why = format!("{folder}: it cannot be read: {error}");
+                    self.incomparable(&folder, &why);
+                    return Ok(());
+                }
+            }
+        }
+        let [in_a, in_b] = &names;
+        for name in in_a | in_b {
+            if interrupted() {
+                return Err(Interrupted.into());
+            }
+            let shown = quote::path(name.as_ref());
+            let lacks = match (in_a.contains(&name), in_b.contains(&name)) {
+                (true, false) => Some((a, b)),
+                (false, _) => Some((b, a)),
+                (true, true) => None,
+            };
+            if let Some((has, lacks)) = lacks {
+                let (has, lacks) = (quote::path(has), quote::path(lacks));
+                self.pairs += 1;
+                self.incomparable(&shown, &format!("{shown} is in {has}, {lacks} lacks it"));
+                continue;
+            }
+            let differs = format!("{shown} differs");
+            self.pair(&shown, &differs, &shown, &a.join(&name), &b.join(&name))?;
+        }
+        let pairs = self.pairs;
+        if pairs == 0 {
+            let (a, b) = (quote::path(a), quote::path(b));
+            let why = format!("there is nothing to compare: no .dump and no .png in {a} and {b}");
+            self.incomparable(&a, &why);
+            return Ok(());
+        }
+        let s = if pairs == 1 { "" } else { "s" };
+        if self.outcome() == Outcome::Equal {
+            writeln!(self.out, "equal: {pairs} pair{s}, {} pixels", self.pixels)?;
+            return Ok(());
+        }
+        write!(self.out, "{} of {pairs} pair{s} differ", self.different)?;
+        if self.different == 1 {
+            write!(self.out, "s")?;
+        }
+        if self.incomparable > 0 {
+            write!(self.out, ", {} could not be compared", self.incomparable)?;
+        }
+        Ok(writeln!(self.out)?)
+    }
+
+    /// Compares two files. `differs` begins the line that tells the difference, `both` names the
+    /// two where they can't be compared.
+    fn pair(
+        &mut self,
+        name: &str,
+        differs: &str,
+        both: &str,
+        a: &Path,
+        b: &Path,
+    ) -> anyhow::Result<()> {
+        self.pairs += 1;
+        let (expected, got) = match (Subject::read(a), Subject::read(b)) {
+            (Ok(expected), Ok(got)) => (expected, got),
+            (expected, got) => {
+                let errors = [expected.err(), got.err()];
+                let errors: Vec<_> = errors.iter().flatten().map(|e| format!("{e:#}")).collect();
+                for error in &errors {
+                    say(format_args!("error: {error}"));
+                }
+                self.count_incomparable(name, &errors.join("; "));
+                return Ok(());
+            }
+        };
+        match compare(&expected, &got) {
+            Ok(None) => {
+                self.pixels += match (&expected, &got) {
+                    (Subject::Picture(picture), _) | (_, Subject::Picture(picture)) => {
+                        picture.pixels.len()
+                    }
+                    (Subject::Dump(dump), _) => dump.pixels.len(),
+                };
+                if let Some(report) = &mut self.report {
+                    report.add_equal();
+                }
+            }
+            Ok(Some(difference)) => {
+                writeln!(self.out, "{differs}: {difference}")?;
+                self.different += 1;
+                if let Some(report) = &mut self.report {
+                    report.add(name, &expected, &got, &difference);
+                }
+            }
+            Err(why) => self.incomparable(name, &format!("{both} can't be compared: {why:#}")),
+        }
+        Ok(())
+    }
+
+    fn incomparable(&mut self, name: &str, why: &str) {
+        say(format_args!("error: {why}"));
+        self.count_incomparable(name, why);
+    }
+
+    fn count_incomparable(&mut self, name: &str, why: &str) {
+        self.incomparable += 1;
+        if let Some(report) = &mut self.report {
+            report.add_incomparable(name, why);
+        }
+    }
+
+    fn outcome(&self) -> Outcome {
+        match (self.incomparable, self.different) {
+            (0, 0) => Outcome::Equal,
+            (0, _) => Outcome::Different,
+            _ => Outcome::Incomparable,
+        }
+    }
+}
+
+/// The names of the dumps and PNGs in a folder.
+pub(crate) fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
+    let mut names = BTreeSet::new();
+    for entry in fs::read_dir(folder)? {
+        let name = entry?.file_name();
+        let ending = Path::new(&name).extension();
+        if ending.is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known)) {
+            names.insert(name);
+        }
+    }
+    Ok(names)
+}
