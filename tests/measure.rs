@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::sync::LazyLock;
 
 use cost::Work;
-use crystal_ball::measure::{self, Config, Cpu, Emulated, Measured, Memories};
+use study::measure::{self, Config, Cpu, Emulated, Measured, Memories};
 use texmap::{Mapper, Order};
 
 use crate::ready::READY;

@@ -1,7 +1,5 @@
-//! The `crystal-ball` command: what accuracy costs, and the window.
+//! What the `crystal-ball` command and its tests share.
 
-pub mod measure;
-pub mod trade;
 pub mod window;
 
 use std::path::PathBuf;

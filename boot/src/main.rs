@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
-use crystal_ball::{trade, window};
+use crystal_ball::window;
 use frames::card::{self, Card, Emulated};
 use frames::comparison;
 use frames::golden;
@@ -21,6 +21,7 @@ use link::{Action, Change, Command};
 use qemu::{Config, Failure, Machine, Printed, Verdict};
 use scene::catalogue::Entry;
 use setup::{Options, Ready};
+use study::trade;
 use system::quote::printable;
 use system::{Interrupted, quote, say, write_atomically};
 
