@@ -10,9 +10,9 @@
 //! motion none
 //! start 4b00
 //! size 320 240
-//! palette 00 000000 2a1c0f ...     16 lines of 16 colours, 6 bits a part: 00 to 3f
-//! line 000 6b6b6b6b ...            a line for each scan line, two hex digits a pixel
-//! end 264 lines 5d41402a
+//! palette 00 000000 3f3f3f ...     16 lines of 16 colours, 6 bits a part: 00 to 3f
+//! line 000 b2b2b2b2 ...            a line for each scan line, two hex digits a pixel
+//! end 265 lines 038ed8bb
 //! ```
 //!
 //! Each of them is a line of the protocol, so it ends in its own checksum. The last one counts the

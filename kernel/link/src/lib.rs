@@ -4,7 +4,7 @@
 //! what was said. The kernel's lines end in a checksum:
 //!
 //! ```text
-//! ok show 1000 page 1 *8f3a90c4
+//! ok show 480 *999dd5b2
 //! ```
 //!
 //! The eight hex digits are the CRC-32 (ISO-HDLC) of everything before ` *`. A line ends in LF, in
