@@ -1,0 +1,64 @@
+//! The subcommands, a file for each.
+
+pub mod bless;
+pub mod clean;
+pub mod diff;
+pub mod doctor;
+pub mod dump;
+pub mod emulate;
+pub mod image;
+pub mod qemu;
+pub mod record;
+pub mod replay;
+pub mod trade;
+mod watch;
+
+use std::process::ExitCode;
+
+use setup::Options;
+
+use crate::arguments::{Boot, Cli, Subcommands, Tools};
+use crate::common::Common;
+
+/// Runs the subcommand of a command line, and returns its exit code.
+///
+/// # Errors
+/// Whatever stops it; `main` turns the error into a message and an exit code.
+pub fn run(cli: Cli) -> anyhow::Result<ExitCode> {
+    let Cli {
+        command,
+        boot: Boot { headless, vga },
+        look,
+        model,
+        tools: Tools { qemu, toolchain },
+        qemu_arguments,
+    } = cli;
+    let common = Common {
+        headless,
+        vga,
+        look,
+        files: model,
+        options: Options {
+            toolchain,
+            qemu,
+            window: false,
+            ramdisk: None,
+        },
+        qemu_arguments,
+    };
+    match command {
+        None => watch::run(common)?,
+        Some(Subcommands::Doctor) => return doctor::run(common),
+        Some(Subcommands::Qemu { suite }) => self::qemu::run(common, suite.as_deref())?,
+        Some(Subcommands::Clean) => clean::run()?,
+        Some(Subcommands::Dump(frames)) => dump::run(common, &frames)?,
+        Some(Subcommands::Emulate(frames)) => emulate::run(&common, &frames)?,
+        Some(Subcommands::Record(options)) => return record::run(common, &options),
+        Some(Subcommands::Replay(options)) => replay::run(&options)?,
+        Some(Subcommands::Diff { a, b, report }) => return diff::run(&a, &b, report.as_deref()),
+        Some(Subcommands::Bless { folder }) => bless::run(&common, folder)?,
+        Some(Subcommands::Trade(options)) => return trade::run(common, options),
+        Some(Subcommands::Image { out }) => image::run(common, &out)?,
+    }
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,26 @@
+//! `emulate`: frames from the emulated VGA.
+
+use frames::card::{self, Emulated};
+use frames::write::Frames;
+use import::Model;
+
+use crate::common::Common;
+use crate::output::print_path;
+
+/// Examples for the help.
+pub const HELP: &str = "\
+Examples:
+  cargo run -- emulate --frames 0..10 --out b                  the files of `dump`
+  cargo run -- emulate --frame 0 --frame 480 --mapper affine   two frames, into dumps/
+  cargo run -- emulate --pose 40000000 0 0 50000 --scene cube  a pose of your choice
+  cargo run -- emulate --frame 8 --mapper exact --motion ffa4fa50 0 0 0
+                                                               in reduced quality";
+
+/// Writes a dump and a PNG of each frame.
+pub fn run(common: &Common, frames: &Frames) -> anyhow::Result<()> {
+    let model = common.load()?;
+    let pack = model.as_ref().map(Model::pack);
+    let mut memory = card::memory();
+    let mut card = Emulated::with(&mut memory, pack.as_ref())?;
+    frames.write(&mut card, &common.look, print_path)
+}

@@ -1,0 +1,34 @@
+//! `record`: an animation.
+
+use std::process::ExitCode;
+
+use frames::card::{self, Emulated};
+use frames::record::Options;
+use import::Model;
+use system::say;
+
+use crate::common::Common;
+use crate::output::print_path;
+
+/// Examples for the help.
+pub const HELP: &str = "\
+Examples:
+  cargo run -- record --out ball.gif                            a whole turn of the ball, 12 s
+  cargo run -- record --scene knot --every 6 --out knot.gif     ten frames a second
+  cargo run -- record --frames 0..60 --every 1 --out frames     every frame of a second, as PNGs";
+
+/// Boots, and records what QEMU's card holds. Wrong options give exit code 2.
+pub fn run(mut common: Common, options: &Options) -> anyhow::Result<ExitCode> {
+    if let Err(error) = options.check() {
+        say(format_args!("error: {error}"));
+        return Ok(ExitCode::from(2));
+    }
+    let model = common.load_to_boot()?;
+    let mut machine = common.boot(model.as_ref())?;
+    let pack = model.as_ref().map(Model::pack);
+    let mut memory = card::memory();
+    let mut emulated = Emulated::with(&mut memory, pack.as_ref())?;
+    options.record(&mut machine, &mut emulated, &common.look, print_path)?;
+    machine.leave()?;
+    Ok(ExitCode::SUCCESS)
+}

@@ -1,0 +1,17 @@
+//! `replay`: many frames at once.
+
+use frames::replay::Options;
+
+use crate::output::print_path;
+
+/// Examples for the help.
+pub const HELP: &str = "\
+Examples:
+  cargo run -- replay dumps                      play a folder in the terminal
+  cargo run -- replay dumps --sheet sheet.png    the whole folder on one sheet
+  cargo run -- replay tests/golden --sheet goldens.png";
+
+/// Plays a folder, or makes its sheet.
+pub fn run(options: &Options) -> anyhow::Result<()> {
+    options.run(print_path)
+}

@@ -1,0 +1,38 @@
+//! `trade`: the study of what accuracy costs.
+
+use std::process::ExitCode;
+
+use import::Model;
+use study::trade::{self, Options};
+use system::say;
+
+use crate::common::Common;
+use crate::output::print_path;
+
+/// Examples for the help.
+pub const HELP: &str = "\
+Examples:
+  cargo run --release -- trade                            everything, in minutes
+  cargo run --release -- trade --quick --host-only        a first look
+  cargo run --release -- trade --scenes cube,tilted --mappers affine,linear-16,exact
+                                                          a part
+  cargo run --release -- trade --model thing.obj          your own model alone";
+
+/// Measures, and writes tables, plots and a page. A debug build gives exit code 2.
+pub fn run(common: Common, mut options: Options) -> anyhow::Result<ExitCode> {
+    if let Err(error) = trade::check_build() {
+        say(format_args!("error: {error}"));
+        return Ok(ExitCode::from(2));
+    }
+    let (scene, mapper) = (common.look.scene, common.look.mapper);
+    options.scenes.extend(scene.map(|scene| scene.0.into()));
+    options
+        .mappers
+        .extend(mapper.map(|mapper| mapper.to_string()));
+    let model = common.load()?;
+    let pack = model.as_ref().map(Model::pack);
+    let page = trade::run(&options, common.options, pack.as_ref())?;
+    say("the results, as a page with tables and plots beside it:");
+    print_path(&page)?;
+    Ok(ExitCode::SUCCESS)
+}

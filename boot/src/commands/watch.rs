@@ -1,0 +1,87 @@
+//! No subcommand: boot the image and watch.
+
+use std::time::{Duration, Instant};
+
+use crystal_ball::window;
+use frames::card::Card;
+use frames::look::Look;
+use link::{Action, Change, Command};
+use qemu::{Config, Machine};
+use system::{say, write_atomically};
+
+use crate::common::{Common, has_display};
+use crate::output::print_path;
+
+/// The time for which the solid turns before its PNG is taken, without a display.
+const WARM_UP: Duration = Duration::from_secs(1);
+
+/// Boots the image in a window; without a display, or with `--headless`, boots it and leaves a PNG.
+pub fn run(mut common: Common) -> anyhow::Result<()> {
+    let model = common.load_to_boot()?;
+    let headless = common.headless;
+    common.options.window = !headless && has_display();
+    let ready = setup::ready(&common.options)?;
+    let config = common.config(&ready, model.as_ref());
+    let look = &common.look;
+    let displays = &ready.qemu.displays;
+    // GTK's window scales the frame with its size only with this option.
+    let display = [("gtk", "gtk,zoom-to-fit=on"), ("sdl", "sdl")]
+        .into_iter()
+        .find(|(name, _)| displays.iter().any(|display| display == name))
+        .filter(|_| common.options.window)
+        .map(|(_, display)| display);
+    if display.is_none() && !headless {
+        let why = if has_display() {
+            "this QEMU has no window (on Debian, install the package qemu-system-gui)"
+        } else {
+            "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+        };
+        say(format_args!("{why}: booting without a window"));
+    }
+    let name = png_name(look, config.pack);
+    let start = Instant::now();
+    say(format_args!("booting in QEMU {}", ready.qemu.version));
+    let mut machine = Machine::boot(&Config {
+        display: display.unwrap_or("none").to_string(),
+        ..config
+    })?;
+    machine.wait_until_running()?;
+    if display.is_some() {
+        // SDL's window takes the size of the card's mode when QEMU next reads the screen, which is now.
+        machine.screen()?;
+        // If the window cannot be enlarged, it stays as small as QEMU made it.
+        let _ = window::enlarge(machine.process());
+    }
+    for command in look.commands() {
+        machine.ask(command)?;
+    }
+    let seconds = start.elapsed().as_secs_f64();
+    say(format_args!(
+        "the first frame is on the screen after {seconds:.1} s"
+    ));
+    if display.is_some() {
+        machine.ask(Command::Steer(None, Change::Act(Action::Hint)))?;
+        say("press H in the window to see the keys; close it or press Ctrl-C to end the run");
+        return machine.watch();
+    }
+    machine.rest(WARM_UP)?;
+    let png = setup::folder().join(name);
+    let screen = machine.screen()?;
+    write_atomically(&png, |file| screen.write_png(file))?;
+    machine.leave()?;
+    say("a frame of the running demo:");
+    Ok(print_path(&png)?)
+}
+
+/// Returns the name of a run's PNG. Two runs at once that show different things write different files.
+fn png_name(look: &Look, pack: Option<u32>) -> String {
+    let mut name = String::from("picture");
+    for command in look.commands() {
+        if let Command::Set(_, Some(word)) = command {
+            // A tolerance is a fraction.
+            name += &format!("-{word}").replace('/', "_");
+        }
+    }
+    name.extend(pack.map(|pack| format!("-{pack:08x}")));
+    name + ".png"
+}
