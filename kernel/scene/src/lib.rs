@@ -9,24 +9,21 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-mod ball;
 mod camera;
 pub mod catalogue;
 mod clip;
 mod colour;
-mod corridor;
+mod entry;
 pub mod font;
-mod knot;
 mod mesh;
 mod noise;
 mod paint;
 mod pose;
 mod stage;
-mod surfaces;
 pub mod trig;
 
-pub use ball::{TEXELS, ball, paint_ball};
 pub use camera::{FOCAL_LENGTH, NEAR};
+pub use catalogue::ball::{TEXELS, ball, paint_ball};
 pub use colour::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable, MATERIALS};
 pub use mesh::{Corner, Face, MAX_CORNERS, MAX_EXTENT, Mesh, Vec3};
 pub use pose::{Orientation, Pose};

@@ -7,12 +7,14 @@
 
 use texmap::Texture;
 
-use crate::catalogue::MAX_TEXELS;
+use super::motion::{self, DEGREE, units};
+use super::surfaces::{self, SIDE, shade};
+use crate::colour::BACKGROUND;
 use crate::colour::Ramp::{Azure, Gold, Indigo, Pearl, Rose, Teal, Violet};
+use crate::entry::{Colours, Cover, Entry, MAX_TEXELS};
 use crate::noise::fractal;
-use crate::surfaces::{self, SIDE, shade};
 use crate::trig::{cos, mul, sin};
-use crate::{Corner, Face, Mesh, Vec3};
+use crate::{Corner, Face, Mesh, Pose, Vec3};
 
 /// Rings along the curve, and corners of each.
 const RINGS: usize = 60;
@@ -35,13 +37,31 @@ struct Solid {
 }
 
 /// Built by the compiler.
-static KNOT: Solid = build();
+static SOLID: Solid = build();
 
 /// The knot.
-pub const MESH: Mesh<'static> = Mesh {
-    vertices: &KNOT.vertices,
-    corners: &KNOT.corners,
-    faces: &KNOT.faces,
+pub const KNOT: Entry<'static> = Entry {
+    name: "knot",
+    about: "a tube tied in a trefoil: parts of it hide others",
+    mesh: MESH,
+    colours: Colours::BUILT_IN,
+    background: &BACKGROUND,
+    cover: Cover::Painted(|texels| paint(texels).into()),
+    mipmaps: false,
+    pose: |tick| Pose {
+        yaw: motion::turn(tick).wrapping_mul(2).wrapping_neg(),
+        pitch: (70 * DEGREE).wrapping_add(motion::turn(tick)),
+        roll: 20 * DEGREE,
+        distance: units(31, 10),
+    },
+    tile: 0,
+};
+
+/// The knot.
+const MESH: Mesh<'static> = Mesh {
+    vertices: &SOLID.vertices,
+    corners: &SOLID.corners,
+    faces: &SOLID.faces,
     convex: false,
 };
 
@@ -164,7 +184,7 @@ const fn build() -> Solid {
 }
 
 /// Paints the tube's texture, whose opposite borders fit each other.
-pub fn paint(texels: &mut [u8; MAX_TEXELS]) -> Texture<'_> {
+fn paint(texels: &mut [u8; MAX_TEXELS]) -> Texture<'_> {
     surfaces::paint(texels, ribbon)
 }
 

@@ -4,8 +4,9 @@ use modex::HEIGHT;
 use texmap::Texture;
 
 use crate::colour::{BACKGROUND, LIGHT_TABLE, PALETTE};
+use crate::entry::{Colours, Cover, Entry, MAX_TEXELS};
 use crate::trig::{cos, mul, sin};
-use crate::{Corner, Face, Mesh, Scene, Vec3, paint};
+use crate::{Corner, Face, Mesh, Pose, Scene, Vec3, paint};
 
 /// Facets around: 15 degrees each, so that gold meridians lie along edges and do not kink.
 const SEGMENTS: usize = 24;
@@ -29,13 +30,30 @@ struct Solid {
 }
 
 /// Built by the compiler: the boot image carries it, nothing is computed at the start.
-static BALL: Solid = build();
+static SOLID: Solid = build();
 
 /// The ball.
-pub const MESH: Mesh<'static> = Mesh {
-    vertices: &BALL.vertices,
-    corners: &BALL.corners,
-    faces: &BALL.faces,
+pub const BALL: Entry<'static> = Entry {
+    name: "ball",
+    about: "the globe of flat facets: many small polygons, short runs",
+    mesh: MESH,
+    colours: Colours::BUILT_IN,
+    background: &BACKGROUND,
+    cover: Cover::Painted(|texels| {
+        let (texels, _) = texels.split_at_mut(TEXELS);
+        paint_ball(texels.try_into().expect("it was cut to TEXELS")).into()
+    }),
+    mipmaps: false,
+    pose: Pose::at_tick,
+    tile: 0,
+};
+const _: () = assert!(TEXELS <= MAX_TEXELS);
+
+/// The ball.
+const MESH: Mesh<'static> = Mesh {
+    vertices: &SOLID.vertices,
+    corners: &SOLID.corners,
+    faces: &SOLID.faces,
     convex: true,
 };
 
@@ -219,14 +237,14 @@ mod tests {
     #[test]
     fn the_ball_is_closed_and_looks_outward() {
         let mut edges = HashMap::new();
-        for face in &BALL.faces {
-            let corners = &BALL.corners[usize::from(face.first)..][..3];
+        for face in &SOLID.faces {
+            let corners = &SOLID.corners[usize::from(face.first)..][..3];
             for (i, a) in corners.iter().enumerate() {
                 let b = &corners[(i + 1) % 3];
                 *edges.entry((a.vertex, b.vertex)).or_insert(0) += 1;
             }
             let [a, b, c] =
-                [0, 1, 2].map(|i| BALL.vertices[usize::from(corners[i].vertex)].map(i64::from));
+                [0, 1, 2].map(|i| SOLID.vertices[usize::from(corners[i].vertex)].map(i64::from));
             let (p, q) = (
                 [0, 1, 2].map(|k| b[k] - a[k]),
                 [0, 1, 2].map(|k| c[k] - a[k]),
@@ -252,7 +270,7 @@ mod tests {
     #[test]
     fn neighbours_share_places_in_the_texture() {
         let mut places: HashMap<u16, Vec<(i32, i32)>> = HashMap::new();
-        for corner in &BALL.corners {
+        for corner in &SOLID.corners {
             places
                 .entry(corner.vertex)
                 .or_default()

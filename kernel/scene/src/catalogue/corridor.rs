@@ -7,11 +7,13 @@
 
 use texmap::Texture;
 
-use crate::catalogue::{MAX_TEXELS, Textures};
+use super::motion::{sway, units};
+use super::surfaces::{part, shade};
+use crate::colour::LEVEL_BACKGROUND;
 use crate::colour::Ramp::{Azure, Gold, Indigo, Pearl, Rose, Teal, Violet};
+use crate::entry::{Colours, Cover, Entry, MAX_TEXELS, Textures};
 use crate::noise::{fractal, hash};
-use crate::surfaces::{part, shade};
-use crate::{Corner, Face, Mesh, Vec3};
+use crate::{Corner, Face, Mesh, Pose, Vec3};
 
 /// Texels along each side of a tile.
 const TILE: u16 = 64;
@@ -36,13 +38,54 @@ struct Solid {
     faces: [Face; FACES],
 }
 
-static CORRIDOR: Solid = build();
+static SOLID: Solid = build();
+
+/// A walk between two walls.
+pub const CORRIDOR: Entry<'static> = Entry {
+    name: "corridor",
+    about: "a walk between two walls: tiled textures, a mipmap for each distance",
+    mesh: MESH,
+    colours: Colours::BUILT_IN,
+    background: &LEVEL_BACKGROUND,
+    cover: Cover::Painted(paint),
+    mipmaps: true,
+    pose: stroll,
+    tile: STEP,
+};
+
+/// The same walk without mipmaps.
+pub const MOIRE: Entry<'static> = Entry {
+    name: "moire",
+    about: "the same walk without mipmaps: what is far away shimmers",
+    mesh: MESH,
+    colours: Colours::BUILT_IN,
+    background: &LEVEL_BACKGROUND,
+    cover: Cover::Painted(paint),
+    mipmaps: false,
+    pose: stroll,
+    tile: STEP,
+};
+
+/// A tile of the corridor's floor and walls, 16.16 units.
+const STEP: i32 = 1 << 16;
+
+/// A tile of the corridor forward in three quarters of a second, and a look to either side: seamless,
+/// since all tiles are alike.
+fn stroll(tick: u32) -> Pose {
+    const TICKS: u32 = 45;
+    Pose {
+        yaw: sway(tick, 9),
+        pitch: 0,
+        roll: sway(tick.wrapping_mul(2), 1),
+        distance: units(3, 1) - (tick % TICKS) as i32 * STEP / TICKS as i32,
+    }
+}
 
 /// The corridor: textures 0 and 1 are those of [`paint`].
-pub const MESH: Mesh<'static> = Mesh {
-    vertices: &CORRIDOR.vertices,
-    corners: &CORRIDOR.corners,
-    faces: &CORRIDOR.faces,
+const MESH: Mesh<'static> = Mesh {
+    vertices: &SOLID.vertices,
+    corners: &SOLID.corners,
+    faces: &SOLID.faces,
     // What is inside of a convex solid hides nothing either.
     convex: true,
 };
@@ -137,7 +180,7 @@ const fn build() -> Solid {
 }
 
 /// Paints the tile of the floor and that of the walls.
-pub fn paint(texels: &mut [u8; MAX_TEXELS]) -> Textures<'_> {
+fn paint(texels: &mut [u8; MAX_TEXELS]) -> Textures<'_> {
     const LEN: usize = TILE as usize * TILE as usize;
     let (floor, rest) = texels.split_at_mut(LEN);
     let (wall, _) = rest.split_at_mut(LEN);

@@ -4,8 +4,8 @@
 
 use texmap::Texture;
 
-use crate::catalogue::MAX_TEXELS;
 use crate::colour::Ramp::{self, Azure, Gold, Indigo, Pearl, Rose, Teal, Violet};
+use crate::entry::MAX_TEXELS;
 use crate::font::covers;
 use crate::noise::{ONE, fractal, hash};
 use crate::trig::{cos, sin};

@@ -1,0 +1,60 @@
+//! Faces of four corners that show the whole of a texture.
+
+use super::surfaces::SIDE;
+use crate::{Corner, Face, Mesh, Vec3};
+
+/// A square that lies `y` below the eye, `half` to either side and as far to the front and back.
+/// The texture's top is far away, so that writing is read from the near edge.
+pub const fn lying(half: i32, y: i32) -> [Vec3; 4] {
+    [
+        [-half, y, half],
+        [half, y, half],
+        [half, y, -half],
+        [-half, y, -half],
+    ]
+}
+
+/// The whole texture on four vertices from `first` on, clockwise from its top left.
+pub const fn corners<const N: usize>() -> [Corner; N] {
+    let side = (SIDE as i32) << 16;
+    let places = [(0, 0), (side, 0), (side, side), (0, side)];
+    let mut corners = [Corner {
+        vertex: 0,
+        u: 0,
+        v: 0,
+    }; N];
+    let mut i = 0;
+    while i < N {
+        corners[i] = Corner {
+            vertex: i as u16,
+            u: places[i % 4].0,
+            v: places[i % 4].1,
+        };
+        i += 1;
+    }
+    corners
+}
+
+/// A face of four corners.
+pub const fn face(first: u16, normal: Vec3) -> Face {
+    Face {
+        first,
+        corners: 4,
+        texture: 0,
+        normal,
+    }
+}
+
+/// One, with a normal's 14 fraction bits.
+pub const ONE: i32 = 1 << 14;
+pub static ONE_FACE: [Corner; 4] = corners();
+static UPWARD: [Face; 1] = [face(0, [0, -ONE, 0])];
+
+pub const fn lies(vertices: &'static [Vec3]) -> Mesh<'static> {
+    Mesh {
+        vertices,
+        corners: &ONE_FACE,
+        faces: &UPWARD,
+        convex: true,
+    }
+}
