@@ -2,6 +2,7 @@
 
 pub mod clock;
 mod cpu;
+mod frame;
 pub mod keyboard;
 mod ports;
 pub mod report;

@@ -250,6 +250,12 @@ impl Machine {
         self.process.as_raw_nonzero().get().unsigned_abs()
     }
 
+    /// Returns how long QEMU's threads have been ready to run without a processor, in all. On a quiet machine
+    /// this hardly grows.
+    pub fn starved_time(&self) -> Duration {
+        watchdog::starved_time(self.process)
+    }
+
     /// Waits until the running show's first picture is on the screen.
     ///
     /// # Errors

@@ -87,9 +87,9 @@ fn processor_time(process: Pid) -> Duration {
     Duration::from_millis(all * 1000 / rustix::param::clock_ticks_per_second().max(1))
 }
 
-/// How long the threads of a process were ready to run and had no processor; none where the system
+/// Returns how long the threads of a process were ready to run and had no processor; zero if the system
 /// does not count it.
-fn starved_time(process: Pid) -> Duration {
+pub fn starved_time(process: Pid) -> Duration {
     let tasks = std::fs::read_dir(format!("/proc/{}/task", process.as_raw_nonzero()));
     let delays = tasks.into_iter().flatten().flatten().filter_map(|task| {
         let counted = std::fs::read_to_string(task.path().join("schedstat")).ok()?;

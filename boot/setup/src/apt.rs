@@ -12,11 +12,11 @@ use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, anyhow, bail};
-use sha2::{Digest, Sha256};
 use tempfile::TempDir;
 
 use super::cache::{self, Locked, is_full};
-use super::toolchain::offline;
+use super::offline::offline;
+use super::sha256::sha256;
 use system::{Interrupted, child};
 use system::{Step, bytes};
 
@@ -117,14 +117,6 @@ impl Display for Package {
     fn fmt(&self, f: &mut Formatter) -> fmt::Result {
         write!(f, "'' {} {} SHA256:{}", self.file, self.bytes, self.sha256)
     }
-}
-
-/// The hash as sixty-four hexadecimal digits.
-pub fn sha256(data: &[u8]) -> String {
-    Sha256::digest(data)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
 }
 
 /// Whether this system has what is needed here.

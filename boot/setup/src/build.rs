@@ -12,10 +12,10 @@ use std::process::Command;
 use anyhow::Context;
 use tempfile::TempDir;
 
-use super::apt::sha256;
 use super::cache::Locked;
 use super::pin;
 use super::settings;
+use super::sha256::sha256;
 use super::toolchain::Toolchain;
 use system::Step;
 use system::child::{self, Event};

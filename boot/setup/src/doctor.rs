@@ -5,15 +5,16 @@ use std::io::Write;
 use std::path::Path;
 
 use super::cache::{self, Cache};
-use super::toolchain::{self, Toolchain};
-use super::{Options, Qemu, apt, build, debian, pin, qemu};
+use super::offline::offline;
+use super::toolchain::Toolchain;
+use super::{Options, Qemu, apt, build, compiler, debian, pin, qemu};
 use system::bytes;
 use system::child;
 
 /// Writes the report; true when nothing is missing.
 pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     let cache = Cache::find()?;
-    let toolchain = toolchain::find(&cache, options);
+    let toolchain = compiler::find(&cache, options);
     let qemu = qemu::find(&cache, options);
     let mut lines = vec![
         ("cargo", cargo_line()),
@@ -97,7 +98,7 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     }
     also(
         "network",
-        toolchain::offline().map_or("may be used".to_owned(), |setting| {
+        offline().map_or("may be used".to_owned(), |setting| {
             format!("not used ({setting})")
         }),
     )?;
@@ -135,7 +136,7 @@ fn toolchain_line(
         let (release, folder) = (toolchain.release(), folder.display());
         return Ok(format!("Rust {release} in {folder}, {}", bytes(size)));
     }
-    let online = toolchain::offline().is_none();
+    let online = offline().is_none();
     let rustup = which::which("rustup").is_ok();
     Err(if online && rustup {
         Missing::NextRun(format!(
@@ -150,7 +151,7 @@ fn toolchain_line(
             pin::RUST
         ))
     } else {
-        Missing::ByHand(toolchain::by_hand())
+        Missing::ByHand(compiler::by_hand())
     })
 }
 
@@ -164,7 +165,7 @@ fn qemu_line(qemu: &anyhow::Result<Option<Qemu>>) -> Result<String, Missing> {
 
 /// What is to be done about a package of QEMU's.
 fn fetched(package: &str) -> Result<String, Missing> {
-    Err(match toolchain::offline().is_none() && apt::is_here() {
+    Err(match offline().is_none() && apt::is_here() {
         true => Missing::NextRun(format!(
             "unpacks Debian's package {package} into the cache, and installs nothing"
         )),

@@ -17,12 +17,15 @@ use system::bytes;
 mod apt;
 mod build;
 mod cache;
+mod compiler;
 mod debian;
 mod doctor;
+mod offline;
 mod pin;
 mod qemu;
 mod rustup;
 mod settings;
+mod sha256;
 mod toolchain;
 
 use build::Program;
@@ -124,7 +127,7 @@ fn boot_files(
 ) -> anyhow::Result<(PathBuf, PathBuf)> {
     // Without a cargo the rest would be for nothing: this is known before the downloads.
     build::cargo_path()?;
-    let toolchain = toolchain::get(cache, options)?;
+    let toolchain = compiler::get(cache, options)?;
     let maker = build::image_maker(cache, &toolchain)?;
     let kernel = build::kernel(cache, &toolchain, program)?;
     let ramdisk = options

@@ -9,8 +9,9 @@ use std::path::Path;
 use anyhow::{Context, bail};
 
 use super::cache::{self, Locked};
+use super::offline::offline;
 use super::pin;
-use super::toolchain::{self, Toolchain, offline};
+use super::toolchain::{self, Toolchain};
 use system::Step;
 use system::child;
 

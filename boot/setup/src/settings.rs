@@ -17,7 +17,7 @@ use anyhow::{Context, bail};
 use tempfile::TempDir;
 use toml::{Table, Value};
 
-use super::apt::sha256;
+use super::sha256::sha256;
 
 /// The tables that are carried over: sources of packages, and the ways to them.
 const NETWORK: [&str; 6] = [

@@ -15,6 +15,7 @@
 
 mod keys;
 mod overlay;
+mod palette;
 mod split;
 mod steering;
 

@@ -12,11 +12,12 @@ use core::array;
 use core::fmt::{self, Write};
 
 use link::{Action, TICKS_PER_SECOND};
-use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH};
+use modex::{Destination, HEIGHT, Palette, WIDTH};
 use scene::font;
 use scene::motion::Motion;
 use texmap::{Mapper, Order};
 
+use crate::palette::nearest;
 use crate::split::{self, Split};
 use crate::{KEYS, lower_mark};
 
@@ -210,17 +211,6 @@ impl Inks {
             outline: nearest(palette, [0, 0, 0]),
         }
     }
-}
-
-/// The entry of a palette that is nearest to a colour.
-pub(crate) fn nearest(palette: &Palette, colour: Rgb6) -> u8 {
-    let distance = |entry: &Rgb6| -> u32 {
-        let parts = entry.iter().zip(colour);
-        parts.map(|(&a, b)| u32::from(a.abs_diff(b)).pow(2)).sum()
-    };
-    let entries = (0..=u8::MAX).zip(palette);
-    let nearest = entries.min_by_key(|(_, entry)| distance(entry));
-    nearest.map_or(0, |(index, _)| index)
 }
 
 /// What is told of the pictures.

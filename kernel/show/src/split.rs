@@ -12,7 +12,7 @@ use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH, Window};
 use scene::{Pose, Stage};
 use texmap::{Mapper, Stats};
 
-use crate::overlay::nearest;
+use crate::palette::nearest;
 
 /// The columns of the picture that are shown.
 const COLUMNS: Range<u16> = 108..212;

@@ -19,6 +19,7 @@ use x86_64::structures::gdt::{Descriptor, GlobalDescriptorTable, SegmentSelector
 use x86_64::structures::idt::InterruptDescriptorTable;
 use x86_64::structures::tss::TaskStateSegment;
 
+use super::frame::Frame;
 use super::{keyboard, report, serial, timer};
 
 /// Vector of IRQ 0; the ones below are the CPU's exceptions.
@@ -106,69 +107,6 @@ pub fn init(stack_bottom: u64) {
     unsafe { pics.initialize() };
     // SAFETY: masking only holds interrupts back.
     unsafe { pics.write_masks(MASK[0], MASK[1]) };
-}
-
-/// Everything the CPU and a stub put on the stack, from the lowest address up.
-#[derive(Debug)]
-#[repr(C)]
-pub struct Frame {
-    /// The address that a page fault is about.
-    pub cr2: u64,
-    general: [u64; 15],
-    /// Which exception or interrupt.
-    pub vector: u64,
-    /// The CPU's error code, or 0 for an exception without one.
-    pub error: u64,
-    /// Where it happened.
-    pub rip: u64,
-    /// The code segment there.
-    pub cs: u64,
-    /// The flags there.
-    pub rflags: u64,
-    /// The stack there.
-    pub rsp: u64,
-    /// The stack segment there.
-    pub ss: u64,
-}
-
-impl Frame {
-    /// The general registers by name, in the order in which they are told.
-    pub fn general(&self) -> [(&'static str, u64); 15] {
-        let [
-            r15,
-            r14,
-            r13,
-            r12,
-            r11,
-            r10,
-            r9,
-            r8,
-            rbp,
-            rdi,
-            rsi,
-            rdx,
-            rcx,
-            rbx,
-            rax,
-        ] = self.general;
-        [
-            ("rax", rax),
-            ("rbx", rbx),
-            ("rcx", rcx),
-            ("rdx", rdx),
-            ("rsi", rsi),
-            ("rdi", rdi),
-            ("rbp", rbp),
-            ("r8", r8),
-            ("r9", r9),
-            ("r10", r10),
-            ("r11", r11),
-            ("r12", r12),
-            ("r13", r13),
-            ("r14", r14),
-            ("r15", r15),
-        ]
-    }
 }
 
 /// The stub of vector `VECTOR`, which comes without an error code if `CODE` is 0: a zero takes

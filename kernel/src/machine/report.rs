@@ -6,7 +6,7 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use link::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, PANIC};
 use modex::SetError;
 
-use super::cpu::Frame;
+use super::frame::Frame;
 use super::serial::Unlocked;
 
 /// A failure while one is being reported ends the machine at once: the first is the one to read.
