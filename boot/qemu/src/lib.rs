@@ -730,6 +730,7 @@ fn read_control(stream: UnixStream, send: Sender<Event>) {
                 let _ = send.send(Event::Control(value));
             }
         }
+        let _ = send.send(Event::ControlClosed);
     });
 }
 

@@ -38,6 +38,8 @@ pub enum Event {
     Ended(std::io::Result<ExitStatus>),
     /// Everything on the serial line has been read.
     SerialClosed,
+    /// Everything on the control socket has been read.
+    ControlClosed,
 }
 
 /// What an event asks for.
@@ -82,6 +84,7 @@ pub struct Run {
     /// The lines of the kernel's report.
     report: Vec<String>,
     serial_closed: bool,
+    control_closed: bool,
     /// A verdict that does not wait for QEMU's end.
     certain: Option<Verdict>,
 }
@@ -97,6 +100,7 @@ impl Run {
             Event::Ended(Ok(status)) => self.ended = Some(status),
             Event::Ended(Err(error)) => self.words.push(error.to_string()),
             Event::SerialClosed => self.serial_closed = true,
+            Event::ControlClosed => self.control_closed = true,
         }
         None
     }
@@ -190,12 +194,12 @@ impl Run {
         self.reset || self.shutdown.as_deref() == Some("guest-reset")
     }
 
-    /// Whether the verdict is certain. What the kernel said last may still be on its way when QEMU
-    /// has ended.
+    /// Returns whether the verdict is certain. When QEMU has ended, the last words of the kernel and of QEMU
+    /// may still be on their way.
     pub fn is_decided(&self) -> bool {
         self.certain.is_some()
             || self.shutdown.as_deref() == Some("guest-reset")
-            || (self.ended.is_some() && self.serial_closed)
+            || (self.ended.is_some() && self.serial_closed && self.control_closed)
     }
 
     /// What QEMU printed, if that was all it was asked for (`-machine help`): it ended well before
@@ -284,6 +288,7 @@ mod tests {
                 "words" => Event::Words(rest.into()),
                 "end" => {
                     run.take(Event::SerialClosed);
+                    run.take(Event::ControlClosed);
                     let number: i32 = rest.parse().unwrap();
                     // The wait status: a negative number is a signal's.
                     let status = if number < 0 { -number } else { number << 8 };
@@ -383,6 +388,20 @@ mod tests {
             assert!(run.is_decided() && run.paused.is_none());
             assert_eq!(run.verdict(), Err(Verdict::User), "{events:?}");
         }
+    }
+
+    /// QEMU's last message may be read after its end is known: the reason of a shutdown is in it.
+    #[test]
+    fn the_last_message_is_waited_for() {
+        let (mut run, _) = played(&[HELLO, POWERDOWN]);
+        run.take(Event::Ended(Ok(ExitStatus::from_raw(0))));
+        run.take(Event::SerialClosed);
+        assert!(!run.is_decided());
+        let (_, quit) = QUIT.split_once(' ').unwrap();
+        run.take(Event::Control(serde_json::from_str(quit).unwrap()));
+        run.take(Event::ControlClosed);
+        assert!(run.is_decided());
+        assert_eq!(run.verdict(), Err(Verdict::User));
     }
 
     #[test]
