@@ -1,9 +1,9 @@
-//! Cards that a show runs on: QEMU's, and the emulated one.
+//! VGAs that the demo runs on: QEMU's and the emulated VGA.
 //!
-//! Both take the same commands and give the same kinds of evidence, so what is asked of one can be
-//! asked of the other and the answers compared. What they share is the program (driver, renderer);
-//! how the evidence is taken they do not. QEMU's card is read by the kernel, through Read Map and
-//! the DAC's read port, and its screen by QEMU. The emulated card is looked into from outside, and
+//! Both implement [`Card`]: they accept the same commands and return the same kinds of evidence, so the
+//! answers of one can be compared with the answers of the other. They share the program (driver and renderer)
+//! but not the way to the evidence. The kernel reads QEMU's video memory through Read Map and the palette
+//! through the DAC's read port, and QEMU captures its screen. The emulated VGA is inspected from outside, and
 //! its geometry comes from its registers.
 
 use anyhow::{Context, anyhow, bail};
@@ -20,33 +20,33 @@ use crate::look::Look;
 use crate::screen::Screen;
 use vga::widen;
 
-/// Returns empty memory for the program. It is built in place: about 4 MiB are more than a thread's stack
-/// holds.
+/// Returns empty memory for the demo. It is built in place, because its size of about 4 MiB exceeds a
+/// thread's stack.
 pub fn memory() -> InPlace<Memory> {
     in_place::boxed!(Memory)
 }
 
-/// A card with a show on it.
+/// A VGA with the demo running on it.
 pub trait Card {
-    /// Carries a command out; the lines of its answer, without the closing `ok`.
+    /// Carries out a command and returns the lines of its answer without the closing `ok`.
     ///
     /// # Errors
-    /// The program's `error`, or why there is no answer.
+    /// The program's `error` line, or the reason why no answer came.
     fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>>;
 
-    /// What the card holds.
+    /// Returns the contents of video memory, with the palette.
     ///
     /// # Errors
-    /// As [`Card::ask`], and a dump that is none.
+    /// As [`Card::ask`], and an answer that is not a valid dump.
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump>;
 
-    /// What the monitor shows.
+    /// Returns the image that the monitor shows.
     ///
     /// # Errors
-    /// Why there is no picture.
+    /// The reason why no image can be captured.
     fn screen(&mut self) -> anyhow::Result<Screen>;
 
-    /// Holds the show anew and has `pictures` shown, one after the other.
+    /// Holds and resets the demo, and shows `pictures` one after the other with the default options.
     ///
     /// # Errors
     /// As [`Card::ask`].
@@ -54,7 +54,7 @@ pub trait Card {
         self.show_as(&Look::default(), pictures)
     }
 
-    /// The same, drawn in a certain way.
+    /// Does the same as [`Card::show`], with the options in `look`.
     ///
     /// # Errors
     /// As [`Card::ask`].
@@ -70,24 +70,24 @@ pub trait Card {
     }
 }
 
-/// The show on the emulated card.
+/// The demo on the emulated VGA.
 #[derive(Debug)]
 pub struct Emulated<'a> {
     show: Show<'a, Vga>,
-    /// The checksum of the pack with the model.
+    /// The checksum of the model file, if one is loaded.
     pack: Option<u32>,
 }
 
 impl<'a> Emulated<'a> {
-    /// The show, held, on a card that was just switched on.
+    /// Returns the demo, held, on an emulated VGA that was just switched on.
     ///
     /// # Errors
-    /// What the card finds wrong with the mode set.
+    /// The fault that the emulated VGA finds in the mode set.
     pub fn new(memory: &'a mut Memory) -> anyhow::Result<Self> {
         Self::with(memory, None)
     }
 
-    /// The same, with the model of a pack as its default scene.
+    /// Returns the same as [`Emulated::new`], with the model in `pack` as the default scene.
     ///
     /// # Errors
     /// As [`Emulated::new`].
@@ -100,7 +100,7 @@ impl<'a> Emulated<'a> {
         Ok(this)
     }
 
-    /// The card itself.
+    /// Returns the emulated VGA.
     pub fn vga(&mut self) -> &mut Vga {
         self.show.bus()
     }
@@ -131,7 +131,7 @@ impl Card for Emulated<'_> {
     }
 
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
-        // What it is the picture of is all that the program is asked for.
+        // The program is asked only for the header's contents: which frame this is, and how it was drawn.
         let state = self.ask(Command::State)?;
         let said = |what| {
             let mut lines = state.iter();
@@ -189,7 +189,7 @@ impl Card for Emulated<'_> {
 mod tests {
     use super::*;
 
-    /// The kernel's own way to a dump, through the card's ports, against a look from outside.
+    /// Compares two ways to a dump: the kernel's, through the VGA's ports, and the inspection from outside.
     #[test]
     fn what_the_program_reads_back_is_what_the_card_holds() {
         let mut memory = memory();

@@ -1,7 +1,7 @@
-//! `diff`: two files or two folders of dumps and indexed PNGs.
+//! The `diff` command: compares two files, or two folders of dumps and indexed PNGs.
 //!
-//! Nothing passes by luck: a file that cannot be compared, a file that one folder lacks, and a comparison of
-//! nothing have an outcome of their own, apart from "equal" and "different".
+//! Nothing passes by luck. A file that cannot be compared, a file that one folder lacks, and a comparison
+//! without any file lead to [`Outcome::Incomparable`], which is neither "equal" nor "different".
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -14,22 +14,22 @@ use system::{Interrupted, interrupted, quote, say};
 use crate::difference::{Subject, compare};
 use crate::report::Report;
 
-/// Endings of the files that are looked for in a folder.
+/// Extensions of the files to compare in a folder.
 const ENDINGS: [&str; 2] = ["dump", "png"];
 
-/// How a comparison ended.
+/// The result of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
-    /// All is equal.
+    /// All pairs are equal.
     Equal,
-    /// Something differs.
+    /// A pair differs.
     Different,
-    /// Something could not be compared.
+    /// A pair could not be compared.
     Incomparable,
 }
 
 impl Outcome {
-    /// The exit code, as `diff` and `cmp` have it.
+    /// Returns the exit code that `diff` and `cmp` use for this result.
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Equal => 0,
@@ -39,11 +39,11 @@ impl Outcome {
     }
 }
 
-/// Compares two files or two folders, and tells what differs on `out`; what could not be compared
-/// goes to standard error. With `report` it is shown in an HTML file, too.
+/// Compares two files or two folders. Differences go to `out`, and errors about pairs that cannot be compared
+/// go to standard error. If `report` is given, both also go into an HTML file.
 ///
 /// # Errors
-/// When `out` or the report can't be written, or the user stopped it.
+/// `out` or the report cannot be written, or the user interrupted the comparison.
 pub fn run(
     a: &Path,
     b: &Path,
@@ -82,9 +82,9 @@ pub fn run(
     Ok(outcome)
 }
 
-/// What a comparison has found so far.
+/// The results so far.
 struct Findings<'a, W> {
-    /// If one is asked for: it keeps what differs.
+    /// The report, if the user requested one.
     report: Option<Report>,
     out: &'a mut W,
     pairs: usize,
@@ -170,8 +170,8 @@ impl<W: Write> Findings<'_, W> {
         Ok(writeln!(self.out)?)
     }
 
-    /// Compares two files. `differs` begins the line that tells the difference, `both` names the
-    /// two where they can't be compared.
+    /// Compares two files. `differs` is the start of the line that describes a difference; `both` names the
+    /// two files in the message that they cannot be compared.
     fn pair(
         &mut self,
         name: &str,
@@ -238,7 +238,7 @@ impl<W: Write> Findings<'_, W> {
     }
 }
 
-/// The names of the dumps and PNGs in a folder.
+/// Returns the names of the dumps and PNGs in a folder.
 pub(crate) fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
     let mut names = BTreeSet::new();
     for entry in fs::read_dir(folder)? {

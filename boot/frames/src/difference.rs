@@ -1,7 +1,7 @@
-//! The difference between two dumps or indexed PNGs, byte by byte.
+//! Compares two dumps or indexed PNGs, byte by byte.
 //!
-//! Indices are compared, not colours: what the card holds, and not what it looks like. The palette is
-//! compared separately. A comparison that is impossible is an error, and never "equal".
+//! The comparison uses indices, not colours: it compares what video memory holds, not how the frame looks.
+//! The palette is compared separately. If a comparison is impossible, the result is an error, never "equal".
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -19,31 +19,32 @@ use crate::dump::Dump;
 use crate::indexed::Indexed;
 use system::quote;
 
-/// How every PNG begins.
+/// The first bytes of every PNG.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
-/// Most bytes that are read of a file; a dump of all memory has about half a million. There are
-/// files without an end.
+/// Most bytes to read from a file; a dump of all memory has about half a million. The limit exists because
+/// some files, such as devices, have no end.
 const MAX_BYTES: u64 = 1 << 26;
-/// Most pixels of a PNG: its header may claim more than there is memory for.
+/// Most pixels of a PNG: a PNG's header may claim more pixels than fit into memory.
 const MAX_PIXELS: u64 = 1 << 24;
-/// What can be compared.
+/// One side of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[expect(
     clippy::large_enum_variant,
     reason = "either has its pixels on the heap"
 )]
 pub enum Subject {
-    /// What a card held.
+    /// The contents of a VGA.
     Dump(Dump),
-    /// A picture, from an indexed PNG.
+    /// A frame from an indexed PNG.
     Picture(Indexed),
 }
 
 impl Subject {
-    /// Reads a PNG or a dump; the content decides which, not the name.
+    /// Reads a PNG or a dump. The content decides which, not the name.
     ///
     /// # Errors
-    /// A file that can't be read, or is neither: with its name, and the line where a dump is wrong.
+    /// A file that cannot be read, or is neither; the error has the file's name, and for a damaged dump the
+    /// line.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         Self::load(path).with_context(|| quote::path(path))
     }
@@ -69,7 +70,7 @@ impl Subject {
         })?))
     }
 
-    /// The picture that is on the screen.
+    /// Returns the frame on the screen.
     pub(crate) fn picture(&self) -> Cow<'_, Indexed> {
         match self {
             Self::Dump(dump) => Cow::Owned(dump.picture()),
@@ -97,106 +98,108 @@ fn read_png(bytes: &[u8]) -> anyhow::Result<Indexed> {
     })
 }
 
-/// In what two subjects differ; [`Display`](fmt::Display) tells it in a line.
+/// The difference between two subjects; [`Display`](fmt::Display) describes it in one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
-    /// The pixels that differ, or the bytes of all memory.
+    /// The pixels that differ; for dumps of all memory, the bytes.
     pub pixels: Option<Pixels>,
-    /// The palette's entries that differ.
+    /// The palette entries that differ.
     pub palette: Option<Colours>,
-    /// What the dumps' headers say differently.
+    /// The fields of the dumps' headers that differ.
     pub fields: Vec<Field>,
 }
 
-/// The pixels that differ.
+/// The pixels, or bytes of video memory, that differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Pixels {
-    /// Where the first of them is: the uppermost line's leftmost; of memory, the lowest address's
-    /// lowest plane.
+    /// The first difference: the leftmost on the uppermost line. In memory: the lowest plane at the lowest
+    /// address.
     pub first: Place,
-    /// The value that is expected there.
+    /// The expected value of the first difference.
     pub expected: u8,
-    /// The value that is there.
+    /// The actual value of the first difference.
     pub got: u8,
-    /// How many differ.
+    /// The number of pixels that differ.
     pub count: usize,
-    /// How many there are.
+    /// The number of pixels compared.
     pub of: usize,
-    /// The box around those that differ; of memory, in the picture whose lines are the dump's.
+    /// The bounding box of the differences. For memory the box is in an image whose lines are the dump's
+    /// lines.
     pub bounds: Bounds,
-    /// How many differ in each plane.
+    /// The number of differences in each plane.
     pub planes: [usize; 4],
-    /// How many differ in each page, and past the last page; empty if a picture was compared.
+    /// The number of differences in each page, and last the number past the last page. Empty unless all video
+    /// memory was compared.
     pub pages: Vec<usize>,
 }
 
-/// Where a pixel is.
+/// The place of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
     /// The plane.
     pub plane: usize,
-    /// From the left, of its page.
+    /// The distance from the left edge of the pixel's page.
     pub x: usize,
-    /// From the top, of its page.
+    /// The distance from the top edge of the pixel's page.
     pub y: usize,
-    /// Where it is in video memory, if that was compared.
+    /// The address in video memory, if all of it was compared.
     pub memory: Option<Address>,
 }
 
-/// Where a byte is in video memory.
+/// The address of a byte in video memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Address {
-    /// Its address in the plane.
+    /// The address in the plane.
     pub address: u16,
-    /// The page that it is in; none past the last.
+    /// The page that contains the byte; `None` past the last page.
     pub page: Option<usize>,
 }
 
-/// A box of pixels; both ends are in it.
+/// A box of pixels; both ends are included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Bounds {
-    /// Leftmost column.
+    /// The leftmost column.
     pub x0: usize,
-    /// Rightmost column.
+    /// The rightmost column.
     pub x1: usize,
-    /// Uppermost line.
+    /// The uppermost line.
     pub y0: usize,
-    /// Lowest line.
+    /// The lowest line.
     pub y1: usize,
 }
 
-/// The palette's entries that differ.
+/// The palette entries that differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Colours {
-    /// The first of them.
+    /// The index of the first entry that differs.
     pub first: usize,
-    /// Its expected colour; none where the expected palette has ended.
+    /// The expected colour of the first entry; `None` if the expected palette is shorter.
     pub expected: Option<Rgb6>,
-    /// Its colour; none where the palette has ended.
+    /// The actual colour of the first entry; `None` if the actual palette is shorter.
     pub got: Option<Rgb6>,
-    /// How many differ.
+    /// The number of entries that differ.
     pub count: usize,
-    /// How many the longer palette has.
+    /// The number of entries in the longer palette.
     pub of: usize,
 }
 
-/// A line of the dumps' headers that differs.
+/// A field of the dumps' headers that differs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Field {
-    /// Its label.
+    /// The field's label.
     pub name: &'static str,
-    /// What is expected.
+    /// The expected value.
     pub expected: String,
-    /// What is there.
+    /// The actual value.
     pub got: String,
 }
 
-/// How the pixels of two subjects lie.
+/// The layout of a subject's pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape {
     /// Pixels in a line.
     pub width: usize,
-    /// Lines of a page, if there is more than one page: the whole memory.
+    /// The lines of a page, if the pixels are all of video memory; `None` for a single page.
     pub memory: Option<usize>,
 }
 
@@ -219,12 +222,12 @@ impl Shape {
         }
     }
 
-    /// Whole pages in memory.
+    /// Returns the number of whole pages in video memory.
     fn pages(&self, height: usize) -> usize {
         4 * PLANE_BYTES / (self.width * height)
     }
 
-    /// Compares pixels.
+    /// Compares pixels of this layout; `None` if they are equal.
     pub fn compare(&self, expected: &[u8], got: &[u8]) -> Option<Pixels> {
         let mut planes = [0; 4];
         let mut pages = match self.memory {
@@ -277,12 +280,11 @@ impl Shape {
     }
 }
 
-/// Compares two subjects; equal ones have no difference. A dump and a picture are compared as
-/// pictures.
+/// Compares two subjects; `None` if they are equal. A dump and a PNG are compared as frames.
 ///
 /// # Errors
-/// When they can't be compared: other contents, sizes or models, or palettes that hold the same colours in
-/// another order, as some programs leave them in a PNG: its indices then say nothing.
+/// Subjects that cannot be compared: different contents, sizes or models, or palettes that hold the same
+/// colours in a different order. Some programs reorder a PNG's palette, and the indices then mean nothing.
 pub fn compare(expected: &Subject, got: &Subject) -> anyhow::Result<Option<Difference>> {
     let difference = match (expected, got) {
         (Subject::Dump(expected), Subject::Dump(got)) => compare_dumps(expected, got)?,
@@ -387,7 +389,7 @@ fn same_size<T: PartialEq + fmt::Display>(expected: (T, T), got: (T, T)) -> anyh
     Ok(())
 }
 
-/// Refuses palettes whose colours are the same, and in other places.
+/// Refuses palettes that hold the same colours in a different order.
 fn same_order(expected: &[Rgb6], got: &[Rgb6]) -> anyhow::Result<()> {
     let mut pairs = expected.iter().zip(got).enumerate();
     let Some((entry, (a, b))) = pairs.find(|(_, (a, b))| a != b) else {
@@ -418,13 +420,13 @@ fn compare_palettes(expected: &[Rgb6], got: &[Rgb6]) -> Option<Colours> {
     })
 }
 
-/// The palette's entries that differ.
+/// Returns the indices of the palette entries that differ.
 pub(crate) fn differing_entries(expected: &[Rgb6], got: &[Rgb6]) -> impl Iterator<Item = usize> {
     let of = expected.len().max(got.len());
     (0..of).filter(|&entry| expected.get(entry) != got.get(entry))
 }
 
-/// A colour, as dumps write it.
+/// A colour, in the notation of dumps.
 pub(crate) struct Colour(pub Rgb6);
 
 impl fmt::Display for Colour {
@@ -434,7 +436,7 @@ impl fmt::Display for Colour {
     }
 }
 
-/// An entry's colour, as dumps write it.
+/// Returns an entry's colour in the notation of dumps, or `nothing` for a missing entry.
 pub(crate) fn colour(colour: Option<Rgb6>) -> String {
     colour.map_or("nothing".into(), |colour| Colour(colour).to_string())
 }
@@ -444,7 +446,7 @@ impl Difference {
         self.pixels.is_none() && self.palette.is_none() && self.fields.is_empty()
     }
 
-    /// What differs, one thing after the other.
+    /// Returns one description for each kind of difference.
     pub(crate) fn parts(&self) -> Vec<String> {
         let pixels = self.pixels.iter().map(ToString::to_string);
         let palette = self.palette.iter().map(ToString::to_string);
@@ -459,7 +461,7 @@ impl fmt::Display for Difference {
     }
 }
 
-/// `count` of `of` `what` differ, as English has it.
+/// Writes "`count` of `of` `what` differ", or "differs" for one.
 fn differ(f: &mut fmt::Formatter<'_>, count: usize, of: usize, what: &str) -> fmt::Result {
     let s = if count == 1 { "s" } else { "" };
     write!(f, "{count} of {of} {what} differ{s}")
@@ -550,7 +552,7 @@ mod tests {
 
     use super::*;
 
-    /// A palette of 256 colours.
+    /// Returns a palette of 256 different colours.
     fn palette() -> modex::Palette {
         std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8])
     }
@@ -577,7 +579,7 @@ mod tests {
         }
     }
 
-    /// What [`compare`] says of a dump and of another that `change` has been at.
+    /// Returns the result of [`compare`] for a dump and a copy that `change` has modified, as text.
     fn told(content: Content, change: impl FnOnce(&mut Dump)) -> String {
         let expected = dump(content);
         let mut got = expected.clone();
@@ -623,7 +625,8 @@ mod tests {
         assert_eq!(told(Content::Memory, |_| {}), "equal");
         let at = |plane: usize, address: usize| 4 * address + plane;
         let some = told(Content::Memory, |got| {
-            // The last bytes of page 0 and of memory, and two of page 2; the first is not plane 0's.
+            // The last bytes of page 0 and of memory, and two bytes of page 2. The first difference is not in
+            // plane 0.
             for i in [
                 at(3, 0x4AFF),
                 at(0, 0x9600),
@@ -733,7 +736,7 @@ mod tests {
         };
         let changed = palette(with(&|palette| palette[200] = [63, 63, 63]));
         assert_eq!((changed.first, changed.count), (200, 1));
-        // Entries that nothing uses, gone: those before them can still be compared.
+        // Unused entries are missing at the end: the entries before them can still be compared.
         let shorter = palette(with(&|palette| palette.truncate(253)));
         assert_eq!(
             shorter.to_string(),

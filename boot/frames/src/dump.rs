@@ -1,8 +1,8 @@
-//! Dumps on the host: read, checked line by line, and written again.
+//! Reads dumps on the host, checks each line, and writes them again.
 //!
-//! The format is `link::dump`'s. Nothing is taken on trust: each line has its checksum, its label
-//! is the one that is due, and the last line's count and checksum are those of the lines before.
-//! So a line that is missing, repeated, or in another's place is told by its number.
+//! [`link::dump`] defines the format. The reader trusts nothing: each line must have a correct checksum and
+//! the expected label, and the last line's count and checksum must match the lines before it. So a missing,
+//! repeated or misplaced line is reported by its number.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -14,14 +14,14 @@ use modex::Palette;
 use crate::indexed::Indexed;
 use system::quote::quoted;
 
-/// What a card held: its palette and the pixels of a page, or of all video memory.
+/// The contents of a VGA: its palette, and the pixels of a page or of all video memory.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Dump {
-    /// What it is of.
+    /// The frame in the dump, and how it was drawn.
     pub header: Header<String>,
-    /// The DAC's colours, 6 bits a part.
+    /// The DAC's colours, 6 bits per component.
     pub palette: Palette,
-    /// The pixels of the rows, one after the other; of memory, pixel i is in plane i & 3 at i / 4.
+    /// The pixels, row by row. For all video memory, pixel i is in plane i & 3 at address i / 4.
     pub pixels: Vec<u8>,
 }
 
@@ -31,12 +31,12 @@ impl fmt::Debug for Dump {
     }
 }
 
-/// Why a text is no dump.
+/// Why a text is not a valid dump.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoDump {
-    /// The line, counted from 1.
+    /// The number of the invalid line, counted from 1.
     pub line: usize,
-    /// What is wrong with it.
+    /// What is wrong with the line.
     pub why: String,
 }
 
@@ -52,7 +52,7 @@ impl Dump {
     /// Reads a dump from a file's bytes: lines with their checksums, ended by LF or CR LF.
     ///
     /// # Errors
-    /// The first line that is not as it must be.
+    /// The first invalid line.
     pub fn read(bytes: &[u8]) -> Result<Self, NoDump> {
         let (mut lines, mut texts) = (Lines::new(), Vec::new());
         for &byte in bytes {
@@ -66,7 +66,8 @@ impl Dump {
                         Err(error) => Err(error.to_string()),
                     }
                 });
-            // Of something else altogether, say that it is no dump, and not what its bytes are.
+            // For a file of an entirely different kind, the error says that it is not a dump, not what its
+            // bytes are.
             let first = texts.is_empty();
             texts.push(text.map_err(|why| NoDump {
                 line: texts.len() + 1,
@@ -85,7 +86,7 @@ impl Dump {
         Self::from_lines(&texts)
     }
 
-    /// Reads a dump from its lines, their checksums checked and taken off.
+    /// Reads a dump from its lines; their checksums have been checked and removed.
     ///
     /// # Errors
     /// As [`Dump::read`].
@@ -101,7 +102,7 @@ impl Dump {
         })
     }
 
-    /// The dump as lines of text, without their checksums.
+    /// Returns the dump's lines without their checksums.
     pub fn lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         self.write_lines(|line| lines.push(line.to_string()));
@@ -111,7 +112,7 @@ impl Dump {
     /// Writes the dump as the kernel does, each line with its checksum.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The writer's error.
     pub fn write(&self, mut to: impl Write) -> io::Result<()> {
         let mut outcome = Ok(());
         self.write_lines(|line| {
@@ -124,7 +125,7 @@ impl Dump {
         outcome
     }
 
-    /// The checksums that stand for the dump, as the kernel tells them.
+    /// Returns the checksums of the dump, as the kernel sends them.
     pub fn checksums(&self) -> Vec<String> {
         let mut lines = Vec::new();
         link::dump::write_checksums(
@@ -136,14 +137,14 @@ impl Dump {
         lines
     }
 
-    /// Pixels from an address on, as the card would be read.
+    /// Copies pixels into `row`, from address `at` on, as a read of the VGA would return them.
     fn load(&self, at: u16, row: &mut [u8]) {
         let first = match self.header.content {
             Content::Page => at.wrapping_sub(self.header.start),
             Content::Memory => at,
         };
         for (i, pixel) in row.iter_mut().enumerate() {
-            // Addresses are 16 bits wide: they wrap.
+            // Addresses have 16 bits and wrap.
             let address = first.wrapping_add((i / 4) as u16);
             *pixel = self.pixels[4 * usize::from(address) + i % 4];
         }
@@ -158,7 +159,7 @@ impl Dump {
         );
     }
 
-    /// The picture on the screen.
+    /// Returns the frame on the screen.
     pub fn picture(&self) -> Indexed {
         let Header {
             width,
@@ -192,7 +193,7 @@ fn no_dump(why: &str) -> String {
     format!("it is no dump: it does not begin with '{MAGIC} {VERSION}' ({why})")
 }
 
-/// Takes a dump's lines in, one by one.
+/// Parses the lines of a dump, one after the other.
 struct Reader<'a> {
     lines: Vec<&'a str>,
     read: usize,
@@ -200,7 +201,7 @@ struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// The rest of the next line, which must begin with `label`.
+    /// Returns the rest of the next line, which must begin with `label`.
     fn line(&mut self, label: &str) -> Result<&'a str, String> {
         let found = self.lines.get(self.read).copied();
         self.read += 1;
@@ -292,7 +293,7 @@ impl<'a> Reader<'a> {
                     .ok_or_else(|| format!("{} is no picture", quoted(name)))?,
             ),
         };
-        // Version 3 named a mapper without a picture, and did not know the motion.
+        // Version 3 named a mapper before the first frame, and had no line `motion`.
         let mapper = mapper.filter(|_| picture.is_some());
         let motion = match version {
             ..4 => None,
@@ -360,7 +361,7 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Appends the bytes that lower-case hex digits stand for.
+/// Appends the bytes that the lower-case hex digits encode.
 fn hex(digits: &str, bytes: &mut Vec<u8>) -> Result<(), String> {
     let nibble = |digit: u8| match digit {
         b'0'..=b'9' => Some(digit - b'0'),
@@ -408,7 +409,7 @@ mod tests {
         }
     }
 
-    /// The lines with another end, as it belongs to them.
+    /// Returns the lines with a new last line that matches the lines before it.
     fn ended(mut lines: Vec<String>) -> Vec<String> {
         lines.pop();
         let mut whole = Whole::default();
@@ -448,7 +449,7 @@ mod tests {
         lines[0] = format!("{MAGIC} 3");
         assert_eq!(lines.remove(6), "motion none");
         assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), old);
-        // It named a mapper before the first picture, too.
+        // Version 3 named a mapper even before the first frame.
         lines[5] = "picture none".into();
         let header = Dump::from_lines(&ended(lines.clone())).unwrap().header;
         assert_eq!((header.mapper, header.picture), (None, None));

@@ -1,6 +1,6 @@
-//! Golden frames: pictures that every change must leave as they are, or bless.
+//! Golden frames: committed frames. A change must leave each of them as it is, or bless the new frame.
 //!
-//! A golden is two files of one name in `tests/golden`: a description, `NAME.toml`,
+//! A golden is two files of the same name in `tests/golden`. `NAME.toml` is the description:
 //!
 //! ```toml
 //! about = "The ball from so near that each of the screen's edges cuts it."
@@ -8,25 +8,26 @@
 //! mapper = "linear-16"      # may be left out, as may be `scene` and `order`
 //! ```
 //!
-//! and `NAME.png`, the last of these pictures, indexed. They are found by folder, so none can be
-//! forgotten in a list: one without its other half is an error.
+//! `NAME.png` is the last of the frames in `show`, as an indexed PNG. The folder is the list of goldens, so
+//! none can be forgotten: a PNG without a description is an error, and a description without a PNG fails its
+//! check.
 //!
-//! Four things must agree: QEMU's card, the emulated card, the PNG, and QEMU's screen.
+//! QEMU's VGA, the emulated VGA, the PNG and QEMU's screen must agree:
 //!
-//! - The emulated card's page is the PNG, byte for byte, palette included.
-//! - QEMU's screendump is the emulated card's scan-out, dot for dot: 640 x 480 of them.
-//! - The kernel sends a CRC-32 of each plane, all 64 KiB of it, of the page and of the palette, as it
-//!   reads them back from QEMU's card. They are the checksums of the emulated card's memory.
-//! - The registers that can be read back are the emulated card's.
-//! - With [`Transfer::Bytes`] the kernel sends every byte of the page, too.
+//! - The emulated VGA's page equals the PNG, byte for byte, palette included.
+//! - QEMU's screendump equals the emulated VGA's scan-out in each of its 640 x 480 dots.
+//! - The kernel reads back QEMU's VGA, and sends a CRC-32 of the page, of the palette, and of each plane with
+//!   all of its 64 KiB. They equal the checksums of the emulated VGA's memory.
+//! - The registers that can be read back equal the emulated VGA's, except PEL Mask, which QEMU does not have.
+//! - With [`Transfer::Bytes`] the kernel also sends every byte of the page, and each byte is compared.
 //!
-//! Checksums are enough for most goldens. CRC-32 finds every change of up to 32 bits in a row, and
-//! every change of one or two bits; of any other one it lets one in 2^32 pass. A wrong byte on the
-//! page must pass the screendump as well, which has no checksum: its colour would have to be the same
-//! one. What checksums cannot show is a fault in how bytes are sent and read, so some goldens send them.
+//! Checksums are enough for most goldens. CRC-32 finds every change of up to 32 consecutive bits and every
+//! change of one or two bits; it misses one in 2^32 of all other changes. A wrong byte on the page must also
+//! pass the screendump, which is compared without a checksum: the wrong byte's colour would have to be equal.
+//! Checksums cannot show a fault in how bytes are sent and read, so some goldens send their bytes.
 //!
-//! Program and renderer are the same on both cards, so equal cards alone would prove little of the
-//! picture: the PNG is what a person once looked at.
+//! Both VGAs run the same program and renderer, so equal VGAs alone would prove little about the frame. The
+//! PNG is what a person once looked at.
 
 use std::fmt;
 use std::fs::File;
@@ -52,15 +53,15 @@ use system::write_atomically;
 /// A golden frame.
 #[derive(Clone, Debug)]
 pub struct Golden {
-    /// Its name: that of its files.
+    /// The golden's name, which is its files' name.
     pub name: String,
-    /// What it is there for.
+    /// Why the golden exists.
     pub about: String,
-    /// The pictures that are shown, after `hold`; the golden is the last.
+    /// The frames to show after `hold`; the golden is the last.
     pub show: Vec<Picture>,
-    /// How they are drawn.
+    /// The options to draw with.
     pub look: Look,
-    /// Its PNG.
+    /// The path of the golden's PNG.
     pub png: PathBuf,
 }
 
@@ -75,11 +76,12 @@ struct Description {
     order: Option<String>,
 }
 
-/// The goldens of a folder by name.
+/// Returns the goldens of a folder, sorted by name.
 ///
 /// # Errors
-/// A folder that can't be read or has none, a description that is none, a PNG without one. A
-/// description without its PNG is found when that is read: `bless` makes it.
+/// A folder that cannot be read or contains no golden, an invalid description, a PNG without a description, a
+/// file that is neither. A description without a PNG is legal here, because `bless` makes the PNG;
+/// [`Findings::check_golden`] reports it.
 pub fn find(folder: &Path) -> anyhow::Result<Vec<Golden>> {
     let files = || format!("{} cannot be read", folder.display());
     let mut goldens = Vec::new();
@@ -147,10 +149,10 @@ impl Golden {
         })
     }
 
-    /// The committed picture; none if it was never blessed.
+    /// Returns the committed frame, or `None` if the golden was never blessed.
     ///
     /// # Errors
-    /// A file that is no indexed PNG.
+    /// A file that cannot be read or is not an indexed PNG.
     pub fn picture(&self) -> anyhow::Result<Option<Indexed>> {
         let wrong = || format!("{} is no golden", self.png.display());
         match File::open(&self.png) {
@@ -163,14 +165,15 @@ impl Golden {
     }
 }
 
-/// An error of TOML's with its line. The error's own words repeat the file's bytes as they are.
+/// Returns a TOML error with its line. The full text of TOML's error is not used, because it quotes the
+/// file's bytes unescaped.
 fn syntax(text: &str, error: &toml::de::Error) -> anyhow::Error {
     let before = error.span().and_then(|span| text.get(..span.start));
     let line = 1 + before.map_or(0, |text| text.matches('\n').count());
     anyhow::anyhow!("line {line}: {}", printable(error.message()))
 }
 
-/// What a description names, if it names it.
+/// Parses an optional name from a description, and refuses an unknown name.
 fn known<T>(
     what: &str,
     name: Option<String>,
@@ -181,14 +184,14 @@ fn known<T>(
     Ok(Some(named))
 }
 
-/// What was found wrong with a golden.
+/// A fault found in a golden.
 #[derive(Debug)]
 pub struct Finding {
     /// The golden's name.
     pub golden: String,
-    /// Which two things, and how they differ.
+    /// Which two things differ, and how.
     pub words: String,
-    /// Expected and got, where pictures show it.
+    /// The expected and the actual side with their difference, if images can show it.
     evidence: Option<Box<(Subject, Subject, Difference)>>,
 }
 
@@ -198,27 +201,27 @@ impl fmt::Display for Finding {
     }
 }
 
-/// How much of what QEMU's card holds is sent and compared.
+/// How much of the contents of QEMU's VGA is sent and compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transfer {
-    /// A CRC-32 of the page, of the palette, and of each plane with all of its 64 KiB. Bytes are
-    /// sent where a checksum differs, to say what is wrong.
+    /// A CRC-32 of the page, of the palette, and of each plane with all of its 64 KiB. Where a checksum
+    /// differs, bytes are sent as well, to locate the fault.
     Checksums,
-    /// The same, and every byte of the page on the screen.
+    /// The checksums, and every byte of the displayed page.
     Bytes,
 }
 
-/// Checks, and collects what they find.
+/// Runs checks and collects the faults that they find.
 #[derive(Debug, Default)]
 pub struct Findings {
     found: Vec<Finding>,
 }
 
 impl Findings {
-    /// Compares the emulated card with the committed picture.
+    /// Compares the emulated VGA's frame with the committed frame.
     ///
     /// # Errors
-    /// When the emulated card can't be asked; a finding is none.
+    /// A failure of the emulated VGA. A fault in the golden is not an error: it is collected.
     pub fn check_golden(
         &mut self,
         golden: &Golden,
@@ -244,11 +247,10 @@ impl Findings {
         Ok(())
     }
 
-    /// Shows the golden on both cards and compares what they hold, show and have in their
-    /// registers.
+    /// Shows the golden on both VGAs and compares their memory, screens and registers.
     ///
     /// # Errors
-    /// When a card can't be asked; a finding is none.
+    /// A failure of a VGA. A fault in the golden is not an error: it is collected.
     pub fn check_cards(
         &mut self,
         golden: &Golden,
@@ -258,7 +260,7 @@ impl Findings {
     ) -> anyhow::Result<()> {
         emulated.show_as(&golden.look, &golden.show)?;
         machine.show_as(&golden.look, &golden.show)?;
-        // Between the answer and the next command, when the kernel touches no video memory.
+        // The kernel has answered and waits for the next command, so it touches no video memory now.
         let screen = machine.screen()?;
         let held = self.check_memory(golden, emulated, machine)?;
         if transfer == Transfer::Bytes || !held {
@@ -288,15 +290,16 @@ impl Findings {
         Ok(())
     }
 
-    /// Compares the checksums of all video memory and of the palette. Where they differ, so must
-    /// the bytes: the first that do are noted. Returns whether the checksums are equal.
+    /// Compares the checksums of all video memory and of the palette. If they differ, the bytes differ too,
+    /// and the first difference is collected. Returns whether the checksums are equal.
     fn check_memory(
         &mut self,
         golden: &Golden,
         emulated: &mut Emulated<'_>,
         machine: &mut impl Card,
     ) -> anyhow::Result<bool> {
-        // From outside the emulated card: the program that runs on both cards has no part in it.
+        // Computed from outside the emulated VGA, so that the program, which both VGAs run, has no part in
+        // it.
         let expected = emulated.dump(Content::Memory)?.checksums();
         let got = machine.ask(Command::Checksums(Content::Memory))?;
         if got == expected {
@@ -315,7 +318,7 @@ impl Findings {
         Ok(false)
     }
 
-    /// Has QEMU's card sent byte by byte, and compares it with the emulated card.
+    /// Has QEMU's VGA send its bytes, and compares them with the emulated VGA's.
     fn check_bytes(
         &mut self,
         golden: &Golden,
@@ -329,7 +332,7 @@ impl Findings {
         Ok(())
     }
 
-    /// Compares two subjects under a golden's name.
+    /// Compares two subjects and collects a difference under the golden's name.
     pub fn compare(&mut self, golden: &Golden, what: &str, expected: &Subject, got: &Subject) {
         let words = match compare(expected, got) {
             Ok(None) => return,
@@ -355,15 +358,16 @@ impl Findings {
         });
     }
 
-    /// What was found.
+    /// Returns the collected faults.
     pub fn found(&self) -> &[Finding] {
         &self.found
     }
 
-    /// Good if nothing was found; otherwise an error with all of it, and the path of a report.
+    /// Succeeds if no fault was collected. Otherwise writes a report to `report`, if images can show a fault,
+    /// and returns an error that lists all faults and the report's path.
     ///
     /// # Errors
-    /// What was found.
+    /// The collected faults.
     pub fn verdict(self, report: &Path) -> anyhow::Result<()> {
         if self.found.is_empty() {
             return Ok(());
@@ -375,17 +379,18 @@ impl Findings {
         if self.found.iter().any(|finding| finding.evidence.is_some()) {
             words += &match self.report(report) {
                 Ok(()) => format!("\nreport: {}", report.display()),
-                // A report that can't be written must not hide what it is about.
+                // If the report cannot be written, the faults must still be listed.
                 Err(error) => format!("\nno report could be written: {error:#}"),
             };
         }
         bail!("{} found wrong:{words}", self.found.len());
     }
 
-    /// Writes what was found with its pictures. The folder is the report's alone, and made anew.
+    /// Writes an HTML report of the faults that images can show. The folder of `html` belongs to the report:
+    /// it is removed and made again.
     ///
     /// # Errors
-    /// When a file cannot be written.
+    /// A file that cannot be written.
     pub fn report(&self, html: &Path) -> anyhow::Result<()> {
         let mut report = Report::new();
         for finding in &self.found {
@@ -394,7 +399,7 @@ impl Findings {
             }
         }
         if let Some(folder) = html.parent() {
-            // What an earlier one left would only confuse.
+            // Files of an earlier report would only confuse the reader.
             let _ = std::fs::remove_dir_all(folder);
             std::fs::create_dir_all(folder)
                 .with_context(|| format!("{} cannot be made", folder.display()))?;
@@ -403,7 +408,7 @@ impl Findings {
     }
 }
 
-/// How two screens differ, in words.
+/// Describes how two screens differ; `None` if they are equal.
 fn difference(expected: &Screen, got: &Screen) -> Option<String> {
     let size = |screen: &Screen| (screen.width, screen.height);
     if size(expected) != size(got) {
@@ -419,11 +424,13 @@ fn difference(expected: &Screen, got: &Screen) -> Option<String> {
     ))
 }
 
-/// Makes the emulated card's pictures the goldens of a folder, if QEMU agrees with each that
-/// changes. `say` is told what changes; the number of PNGs written is returned.
+/// Makes the emulated VGA's frames the goldens of a folder, if QEMU agrees with each frame that changes.
+///
+/// `say` receives a line about each change. Returns the number of PNGs written.
 ///
 /// # Errors
-/// When a card fails, QEMU's card differs (then nothing is written), or a file can't be written.
+/// A VGA that fails, a difference between QEMU's VGA and the emulated VGA (then no PNG is written), a file
+/// that cannot be written.
 pub fn bless<C: Card>(
     folder: &Path,
     report: &Path,
@@ -438,7 +445,7 @@ pub fn bless<C: Card>(
     for golden in find(folder)? {
         emulated.show_as(&golden.look, &golden.show)?;
         let drawn = emulated.dump(Content::Page)?;
-        // What can't be read is blessed anew, as what is not there.
+        // A PNG that cannot be read is blessed again, like a missing PNG.
         let before = golden.picture().unwrap_or_default();
         match before {
             Some(before) if before == drawn.picture() => continue,

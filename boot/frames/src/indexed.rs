@@ -1,4 +1,4 @@
-//! Pictures in palette indices, as a page holds them and as an indexed PNG keeps them.
+//! Frames in palette indices, as a page in video memory and an indexed PNG hold them.
 
 use std::fmt;
 use std::io::{BufRead, Seek, Write};
@@ -7,16 +7,16 @@ use anyhow::{Context, bail};
 use modex::Rgb6;
 use vga::widen;
 
-/// A picture whose pixels are indices into its palette.
+/// A frame whose pixels are indices into its palette.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Indexed {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: usize,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: usize,
-    /// Up to 256 colours, 6 bits a part.
+    /// Up to 256 colours, 6 bits per component.
     pub palette: Vec<Rgb6>,
-    /// `width * height` indices, row by row, each of them in the palette.
+    /// `width * height` indices, row by row. Each index is inside the palette.
     pub pixels: Vec<u8>,
 }
 
@@ -27,10 +27,10 @@ impl fmt::Debug for Indexed {
 }
 
 impl Indexed {
-    /// Writes an indexed PNG of 8 bits a pixel.
+    /// Writes an indexed PNG with 8 bits per pixel.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The writer's error.
     pub fn write_png(&self, to: impl Write) -> anyhow::Result<()> {
         let mut encoder = png::Encoder::new(to, self.width.try_into()?, self.height.try_into()?);
         encoder.set_color(png::ColorType::Indexed);
@@ -47,10 +47,10 @@ impl Indexed {
         Ok(writer.finish()?)
     }
 
-    /// Reads an indexed PNG of 8 bits a pixel.
+    /// Reads an indexed PNG with 8 bits per pixel.
     ///
     /// # Errors
-    /// Any other PNG, colours that six bits can't hold, an index outside the palette.
+    /// Any other PNG, a colour that 6 bits per component cannot represent, an index outside the palette.
     pub fn read_png(from: impl BufRead + Seek) -> anyhow::Result<Self> {
         let mut reader = png::Decoder::new(from).read_info()?;
         let info = reader.info();
@@ -77,7 +77,7 @@ impl Indexed {
         let size = reader.output_buffer_size().context("it is too large")?;
         let mut pixels = vec![0; size];
         reader.next_frame(&mut pixels)?;
-        // A cut file may have all of its pixels, and no end.
+        // A file that is cut short can contain all pixels and lack the end.
         reader.finish()?;
         if let Some(at) = pixels.iter().position(|&p| usize::from(p) >= palette.len()) {
             bail!(

@@ -1,7 +1,7 @@
-//! Frames on the host: the cards that draw them, dumps and PNGs of them, comparison, golden frames, recordings.
+//! Frames on the host: drawing them on a VGA, dumps, PNGs, comparison, golden frames, recordings.
 //!
-//! Nothing here starts QEMU. [`card::Card`] is what QEMU's card and the emulated VGA have in common, so each
-//! function works with both.
+//! Nothing here starts QEMU. Functions that need a VGA are generic over [`card::Card`], which QEMU's VGA and
+//! the emulated VGA implement.
 #![forbid(unsafe_code)]
 
 pub mod card;

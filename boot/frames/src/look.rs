@@ -1,4 +1,4 @@
-//! How pictures are drawn: what a user may choose of it, by name.
+//! The options that decide how frames are drawn: scene, mapper and order, chosen by name.
 
 use std::ffi::OsStr;
 use std::fmt::Display;
@@ -10,35 +10,35 @@ use link::{Command, Setting, Word};
 use scene::catalogue::{CATALOGUE, Entry};
 use texmap::{Mapper, Order};
 
-/// Scene, mapper and order; what is not chosen is as the program has it.
+/// Scene, mapper and order. `None` leaves the choice to the demo.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct Look {
-    /// What is shown [default: ball, or your own model]
+    /// Which scene to show [default: ball, or your own model]
     #[arg(long, global = true, value_name = "NAME")]
     pub scene: Option<Named<&'static str>>,
-    /// How textures are mapped
+    /// The mapper, which finds the texel of each pixel.
     #[arg(long, global = true, value_name = "NAME", value_parser = Mappers,
         help = with_default("How textures are mapped", Mapper::default()))]
     pub mapper: Option<Mapper>,
-    /// In which order the columns of a picture are drawn, and where to
+    /// The order in which the columns of a frame are drawn, and the destination.
     #[arg(long, global = true, value_name = "NAME",
         help = with_default("In which order the columns of a picture are drawn, and where to", name_of(Order::default())))]
     pub order: Option<Named<Order>>,
 }
 
-/// A help text with the default, as clap shows it.
+/// Returns a help text with the default, in clap's notation.
 fn with_default(help: &str, default: impl Display) -> String {
     format!("{help} [default: {default}]")
 }
 
-/// An order's name on the command line.
+/// Returns an order's name on the command line.
 fn name_of(order: Order) -> &'static str {
     let named = Order::ALL.into_iter().find(|(_, other, _)| *other == order);
     named.map_or("", |(name, ..)| name)
 }
 
 impl Look {
-    /// The commands that set it, after [`Command::Hold`].
+    /// Returns the commands that set these options; they follow [`Command::Hold`].
     pub fn commands(&self) -> impl Iterator<Item = Command> {
         let set = |setting, name: &dyn Display| Some(Command::Set(setting, Some(Word::of(name)?)));
         let scene = self.scene.and_then(|s| set(Setting::Scene, &s.0));
@@ -48,11 +48,11 @@ impl Look {
     }
 }
 
-/// Something that has a name on the command line.
+/// A value that has a name on the command line.
 #[derive(Clone, Copy, Debug)]
 pub struct Named<T>(pub T);
 
-/// Mappers by name, those that are listed and those within any tolerance.
+/// Parses a mapper's name: a listed name, or a mapper within any tolerance.
 #[derive(Clone)]
 struct Mappers;
 
@@ -82,7 +82,7 @@ impl TypedValueParser for Mappers {
     }
 }
 
-/// The names of all scenes, the user's own model last.
+/// The names of all scenes; the user's own model is last.
 static SCENES: LazyLock<Vec<Named<&'static str>>> = LazyLock::new(|| {
     let built_in = CATALOGUE.iter().map(|entry| entry.name);
     built_in.chain([Entry::LOADED]).map(Named).collect()

@@ -1,9 +1,9 @@
-//! `record`: pictures one after the other, as a GIF or as a folder of PNGs.
+//! The `record` command: writes successive frames as a GIF or as a folder of PNGs.
 //!
-//! The show is held and asked for each frame, so every frame is there however slow the machine is,
-//! and the same bytes come out each time. QEMU's card tells its checksums; where they are the
-//! emulated card's, its picture is taken, which has the same bytes, and where they are not the whole
-//! dump: ten times as much time on the line.
+//! The demo is held and shows each frame on command, so no frame is missing on a slow machine, and every
+//! recording has the same bytes. For each frame QEMU's VGA sends its checksums. If they equal the emulated
+//! VGA's, the bytes count as equal, and the emulated VGA's frame is written. Otherwise QEMU's VGA sends the
+//! whole dump, which occupies the serial line ten times as long.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -24,29 +24,30 @@ use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
-/// Which frames, and where to.
+/// Which frames to record, and where to.
 #[derive(Args, Clone, Debug)]
 pub struct Options {
-    /// Frames A up to B, without B (with it: A..=B); a turn of the ball takes 720
+    /// Frames A up to B, excluding B (A..=B includes B); the ball turns once in 720 frames
     #[arg(long, value_name = "A..B", value_parser = range, default_value = "0..720")]
     frames: RangeInclusive<u32>,
-    /// Frames from one picture to the next; each stands for 1/60 s
+    /// Record every Nth frame only; a frame is 1/60 s of the demo
     #[arg(long, value_name = "N", default_value = "3",
         value_parser = RangedU64ValueParser::<u32>::new().range(1..=600))]
     every: u32,
-    /// A GIF, if the name ends in .gif, or else a folder for PNGs
+    /// Where to write: a GIF if the name ends in .gif, otherwise a folder of PNGs
     #[arg(long, value_name = "FILE.gif|DIR")]
     out: PathBuf,
 }
 
-/// Fewest 1/100 s that a picture of a GIF is shown: viewers take a shorter time for a tenth.
+/// Shortest time that a GIF's frame is shown, in 1/100 s: viewers replace a shorter time by a tenth of a
+/// second.
 const SHORTEST: u64 = 2;
 
 impl Options {
-    /// Whether the options make sense, before anything is set up.
+    /// Checks the options before anything is set up.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// What is wrong with the options.
     pub fn check(&self) -> anyhow::Result<()> {
         match self.is_gif()? {
             true if centiseconds(self.every.into()) < SHORTEST => bail!(
@@ -74,11 +75,11 @@ impl Options {
         }
     }
 
-    /// Records what `machine` shows, drawn as `look` says, beside `emulated`; `wrote` is told each
-    /// file's path.
+    /// Records the frames of `machine`, drawn with the options in `look`; `emulated` draws the same frames
+    /// for comparison. `wrote` receives each file's path.
     ///
     /// # Errors
-    /// When a card fails or a file can't be written. A GIF is whole or not there; so is each PNG.
+    /// A VGA fails or a file cannot be written. The GIF, and each PNG, is either complete or missing.
     pub fn record(
         &self,
         machine: &mut impl Card,
@@ -121,14 +122,14 @@ impl Options {
         let mut to = BufWriter::new(file);
         let mut pictures = pictures.peekable();
         let Some(Ok((_, first))) = pictures.peek() else {
-            // Of none, and of one that failed, there is nothing to write.
+            // There is no frame, or the first frame failed: no GIF to write.
             return pictures.next().map_or(Ok(()), |failed| failed.map(|_| ()));
         };
         let mut gif = encoder(&mut to, first)?;
         let mut before = None;
         for (i, recorded) in (0..).zip(pictures) {
             let (_, picture) = recorded?;
-            // The times add up to those of the frames, whatever is lost of a single one.
+            // Each delay is the difference of two rounded times, so rounding errors do not add up.
             let every = u64::from(self.every);
             let delay = centiseconds((i + 1) * every) - centiseconds(i * every);
             gif.write_frame(&Frame {
@@ -142,12 +143,12 @@ impl Options {
     }
 }
 
-/// So many ticks in 1/100 s, rounded down.
+/// Converts ticks to 1/100 s, rounded down.
 fn centiseconds(ticks: u64) -> u64 {
     ticks * 100 / u64::from(TICKS_PER_SECOND)
 }
 
-/// What QEMU's card holds when it shows `picture`.
+/// Shows `picture` on both VGAs, and returns the frame that QEMU's VGA holds.
 fn seen(
     machine: &mut impl Card,
     emulated: &mut Emulated<'_>,
@@ -163,7 +164,7 @@ fn seen(
     })
 }
 
-/// A GIF that begins with `picture`, and goes round and round.
+/// Returns an encoder for a GIF that has the size and the palette of `picture` and repeats for ever.
 fn encoder<W: Write>(to: W, picture: &Indexed) -> anyhow::Result<Encoder<W>> {
     let colours: Vec<u8> = picture
         .palette
@@ -177,13 +178,13 @@ fn encoder<W: Write>(to: W, picture: &Indexed) -> anyhow::Result<Encoder<W>> {
     Ok(encoder)
 }
 
-/// A GIF's frame: the rectangle in which `now` is another picture than `before`, what is the same
-/// in it see-through if a colour is left to say so.
+/// Returns the GIF frame for the rectangle in which `now` differs from `before`. Equal pixels in the
+/// rectangle are transparent if a palette index is left for that.
 fn changed(before: Option<&Indexed>, now: &Indexed) -> anyhow::Result<Frame<'static>> {
     let width = now.width;
     let differs = |i: usize| before.is_none_or(|before| before.pixels[i] != now.pixels[i]);
     let places = (0..now.pixels.len()).filter(|&i| differs(i));
-    // Of two pictures that are the same, the first pixel: a frame has one at least.
+    // A GIF frame has at least one pixel: for two equal frames, the bounds become those of the first pixel.
     let (mut left, mut right, mut top, mut bottom) = (width, 1, now.height, 1);
     for i in places {
         let (x, y) = (i % width, i / width);
@@ -261,7 +262,7 @@ mod tests {
             }
             pictures.push(picture.clone());
         }
-        // All 256 colours at once, everywhere else than before: none is left to see through.
+        // A frame in which every pixel changes and all 256 indices occur leaves no index for transparency.
         picture.pixels = (0..280).map(|i| (i + i / 256) as u8).collect();
         pictures.push(picture);
         let mut file = tempfile::tempfile().unwrap();

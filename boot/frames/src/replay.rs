@@ -1,4 +1,4 @@
-//! `replay`: a folder of dumps or pictures, played in the terminal or laid out on one sheet.
+//! The `replay` command: plays dumps or PNGs in the terminal, or lays them out on a contact sheet.
 
 use std::fmt::Write as _;
 use std::io::{IsTerminal, Write, stdout};
@@ -20,41 +20,43 @@ use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
-/// Which pictures, and how they are shown.
+/// Which frames to show, and how.
 #[derive(Args, Clone, Debug)]
 pub struct Options {
-    /// Dumps and indexed PNGs, or folders of them; of a picture that is there as both the dump
+    /// Dumps, indexed PNGs, or folders of them; if a folder has a dump and a PNG of the same name, the dump
+    /// is shown
     #[arg(required = true)]
     paths: Vec<PathBuf>,
-    /// All of them on one sheet in place of the terminal
+    /// Write all frames to one contact sheet instead of playing them in the terminal
     #[arg(long, value_name = "FILE.png")]
     sheet: Option<PathBuf>,
-    /// Pictures a second, in the terminal
+    /// Frames per second in the terminal
     #[arg(long, value_name = "N", default_value = "20",
         value_parser = RangedU64ValueParser::<u32>::new().range(1..=60))]
     rate: u32,
 }
 
-/// Widest that a sheet becomes, in pixels: pictures of many are made smaller.
+/// Largest width of a sheet in pixels, without the gap at its left edge. Frames are shrunk to fit.
 const SHEET_WIDTH: usize = 4096;
-/// Pixels between the pictures of a sheet.
+/// Pixels between the frames of a sheet.
 const GAP: usize = 4;
-/// A sheet's ground, and the names on it.
+/// Colours of a sheet's background, and of the names on it.
 const GROUND: [u8; 3] = [24; 3];
 const NAMES: [u8; 3] = [208; 3];
-/// From letter to letter, and from picture to picture for the name below, in the font's pixels.
+/// Distances in the font's pixels: from letter to letter, and the height that a frame's name occupies below
+/// it.
 const LETTER: usize = font::WIDTH + 1;
 const LINE: usize = font::HEIGHT + 3;
-/// The names are a pixel larger for so many pixels of the pictures' width: below one that is not
-/// shrunk 26 letters have room, twice as large as the font is.
+/// Width of a cell in pixels for each step of the names' scale. Below a frame of 320 pixels the names have
+/// twice the font's size, and 26 letters fit.
 const PER_SCALE: usize = 160;
 
 impl Options {
-    /// Plays the pictures, or makes the sheet and tells `wrote` its path.
+    /// Plays the frames, or writes the sheet and passes its path to `wrote`.
     ///
     /// # Errors
-    /// A file that is neither dump nor PNG, by name; no picture at all; standard output that is no
-    /// terminal, or can't be written.
+    /// A file that is neither a dump nor a PNG, with its name; no frame at all; standard output that is not a
+    /// terminal, or cannot be written.
     pub fn run(&self, wrote: impl FnOnce(&Path) -> std::io::Result<()>) -> anyhow::Result<()> {
         if self.sheet.is_none() && !stdout().is_terminal() {
             bail!("standard output is no terminal to play in; --sheet FILE.png makes a sheet");
@@ -82,7 +84,7 @@ impl Options {
         }
     }
 
-    /// All files, folders opened, each folder's in the order of their names.
+    /// Returns all files: those named directly, and those in each folder, sorted by name.
     fn files(&self) -> anyhow::Result<Vec<PathBuf>> {
         let mut files = Vec::new();
         for path in &self.paths {
@@ -92,7 +94,7 @@ impl Options {
             }
             let names = list(path).with_context(|| format!("{} cannot be read", path.display()))?;
             let pictures = names.iter().map(|name| path.join(name));
-            // A dump and a PNG of one name are one picture.
+            // A dump and a PNG of the same name are the same frame.
             files.extend(pictures.filter(|file| {
                 let dump = file.with_extension("dump");
                 file == &dump || !names.contains(dump.file_name().unwrap_or_default())
@@ -132,7 +134,7 @@ const HOME: &str = "\x1b[H";
 const RESET: &str = "\x1b[0m";
 const ERASE: &str = "\x1b[J";
 
-/// The terminal's other screen: what was on it comes back when this is dropped.
+/// The terminal's alternate screen. Dropping it restores the terminal's contents.
 struct Alternate;
 
 impl Alternate {
@@ -151,17 +153,17 @@ impl Alternate {
 
 impl Drop for Alternate {
     fn drop(&mut self) {
-        // A terminal that is gone needs nothing back.
+        // If the terminal is gone, there is nothing to restore.
         let _ = self.write("\x1b[?25h\x1b[?1049l");
     }
 }
 
-/// A picture's colour at a place, 8 bits a part.
+/// Returns a pixel's colour, 8 bits per component.
 fn colour(picture: &Indexed, x: usize, y: usize) -> [u8; 3] {
     picture.palette[usize::from(picture.pixels[y * picture.width + x])].map(widen)
 }
 
-/// A picture made smaller to `width` x `height`, by the mean of what falls on each pixel.
+/// Shrinks a frame to `width` x `height`. Each pixel is the mean of the pixels that it replaces.
 fn shrunk(picture: &Indexed, width: usize, height: usize) -> Screen {
     let mut pixels = Vec::with_capacity(width * height);
     for j in 0..height {
@@ -193,10 +195,10 @@ fn shrunk(picture: &Indexed, width: usize, height: usize) -> Screen {
     }
 }
 
-/// A picture in half blocks, two pixels to a character, as large as fits.
+/// Returns a frame as half-block characters, two pixels each, as large as fits.
 fn in_blocks(picture: &Indexed, columns: usize, rows: usize) -> String {
     let (columns, rows) = (columns.max(1), rows.max(1));
-    // Pixels of the terminal are about square: a character is twice as high as wide.
+    // A terminal's character is about twice as high as wide, so its two halves are about square.
     let width = columns
         .min(picture.width)
         .min(2 * rows * picture.width / picture.height)
@@ -214,7 +216,8 @@ fn in_blocks(picture: &Indexed, columns: usize, rows: usize) -> String {
     text
 }
 
-/// What stands below the pictures: the files' names, with their folders' where there is more than one.
+/// Returns the names to write below the frames: the files' names, with their folders' names if the files come
+/// from several folders.
 fn names(files: &[PathBuf]) -> Vec<String> {
     let parent = |file: &PathBuf| file.parent().map(Path::to_owned);
     let several = files.iter().any(|file| parent(file) != parent(&files[0]));
@@ -229,8 +232,8 @@ fn names(files: &[PathBuf]) -> Vec<String> {
     files.iter().map(name_of).collect()
 }
 
-/// A name that fits into so many letters: what is cut out is its middle, since names of one folder
-/// often begin alike and end differently.
+/// Shortens a name to a number of letters. The middle is cut out, because names in a folder often begin alike
+/// and differ at the end.
 fn cut(name: &str, letters: usize) -> String {
     const CUT: &str = "..";
     let all: Vec<char> = name.chars().collect();
@@ -249,7 +252,7 @@ fn cut(name: &str, letters: usize) -> String {
         .collect()
 }
 
-/// Writes on a sheet; all of it is on it.
+/// Writes text on a sheet. The text must lie completely on the sheet.
 fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) {
     for (i, letter) in text.chars().enumerate() {
         let rows = font::glyph(letter);
@@ -262,12 +265,12 @@ fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) 
     }
 }
 
-/// All pictures on one sheet, row by row, with their names below.
+/// Returns a sheet of all frames, row by row, with their names below.
 fn lay_out(pictures: &[Indexed], names: &[String]) -> Screen {
     let across = (1..).find(|n| n * n >= pictures.len()).unwrap_or(1);
     let most = |of: fn(&Indexed) -> usize| pictures.iter().map(of).max().unwrap_or(1);
     let (wide, high) = (most(|p| p.width), most(|p| p.height));
-    // As large as they are, if that fits.
+    // Full size, if it fits.
     let cell_width = wide.min((SHEET_WIDTH / across).saturating_sub(GAP)).max(1);
     let cell_height = (high * cell_width / wide).max(1);
     let down = pictures.len().div_ceil(across);
@@ -288,7 +291,7 @@ fn lay_out(pictures: &[Indexed], names: &[String]) -> Screen {
         for (y, row) in (top..).zip(small.pixels.chunks_exact(width)) {
             sheet.pixels[y * sheet.width + left..][..width].copy_from_slice(row);
         }
-        // The last letter needs no gap behind it.
+        // The last letter needs no gap after it.
         let name = cut(name, (cell_width + scale) / (LETTER * scale));
         write(&mut sheet, &name, left, top + height + 2 * scale, scale);
     }
@@ -299,7 +302,7 @@ fn lay_out(pictures: &[Indexed], names: &[String]) -> Screen {
 mod tests {
     use super::*;
 
-    /// Left half black, right half white.
+    /// Returns a frame whose left half is black and whose right half is white.
     fn halves(width: usize, height: usize) -> Indexed {
         Indexed {
             width,
@@ -328,7 +331,7 @@ mod tests {
         assert_eq!((sheet.width, sheet.height), (3 * 324 + 4, 2 * 264 + 4));
         let white = sheet.pixels.iter().filter(|&&pixel| pixel == [255; 3]);
         assert_eq!(white.count(), 5 * 160 * 240);
-        // Nothing stands below the place that is left free, and something below each other one.
+        // The unused sixth place has no letters below it; every other place has some.
         let letters_below = |i: usize| {
             let rows = sheet.pixels.chunks_exact(sheet.width);
             let below = rows.skip(4 + i / 3 * 264 + 240).take(20);
@@ -341,7 +344,7 @@ mod tests {
         let names = vec!["a very long name".repeat(20); 400];
         let many = lay_out(&vec![halves(320, 240); 400], &names);
         assert!(many.width <= SHEET_WIDTH + GAP, "{}", many.width);
-        // Smaller than a letter.
+        // A frame that is smaller than a letter.
         lay_out(&[halves(4, 3)], &["name".into()]);
     }
 

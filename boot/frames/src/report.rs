@@ -1,9 +1,9 @@
-//! What differs, to look at: an HTML file that needs no network, and the pictures beside it.
+//! Writes an HTML report of the differences between frames. The report needs no network.
 //!
-//! `FILE.html` comes with a folder `FILE-files`: for each pair that differs the expected picture,
-//! the one that was got, and their difference as PNGs, and both dumps. The two together can be
-//! moved, zipped or uploaded. What an earlier report has left in the folder stays, and is not
-//! linked to.
+//! Beside `FILE.html` stands a folder `FILE-files`. For each pair that differs it contains the expected
+//! frame, the actual frame and their difference as PNGs, and, if dumps were compared, both dumps. File and
+//! folder can be moved, zipped or uploaded together. Files of an earlier report stay in the folder, but
+//! nothing links to them.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -28,26 +28,26 @@ use vga::widen;
 pub const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
 
-/// How many times as large as they are the pictures are shown, where there is room.
+/// The scale at which frames are shown if the window is wide enough.
 const SCALE: usize = 3;
-/// The width in CSS pixels that smaller pictures are brought up to.
+/// The width in CSS pixels that narrow frames are scaled up to.
 const WIDTH: usize = SCALE * modex::WIDTH;
-/// Differing pixels that are listed with their values.
+/// Most pixels to list with their values.
 const LISTED: usize = 16;
-/// Longest part of a pair's name in the names of its files.
+/// Longest part of a pair's name that becomes part of its files' names, in characters.
 const MAX_NAME: usize = 80;
 
-// The difference image's colours; report.css has them, too, for the legend.
+// The colours of the difference image. report.css repeats them for the legend.
 
-/// Differing pixels, from a difference that is hardly seen to the largest there is.
+/// The two ends of the scale for differing pixels: from a barely visible difference to the largest possible.
 const NEAR: [u8; 3] = [0xFF, 0xE0, 0x3A];
 const FAR: [u8; 3] = [0xFF, 0x1F, 0x6B];
-/// Another index that has the same colour.
+/// A different index with the same colour.
 const SAME_COLOUR: [u8; 3] = [0x20, 0xD5, 0xFF];
-/// The same index that has another colour.
+/// The same index with a different colour.
 const SAME_INDEX: [u8; 3] = [0x8F, 0x7B, 0xFF];
 
-/// Collects the pairs that differ, and writes them down.
+/// Collects the results of a comparison, and writes them as HTML.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
     between: Option<[String; 2]>,
@@ -65,16 +65,16 @@ struct Pair {
     difference: Difference,
 }
 
-/// A file of the report's folder.
+/// A function that writes the contents of a file in the report's folder.
 type Make<'a> = Box<dyn Fn(&mut fs::File) -> anyhow::Result<()> + 'a>;
 
 impl Report {
-    /// A report of nothing yet.
+    /// Returns an empty report.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// A report of nothing yet, that names what is compared.
+    /// Returns an empty report that names the two sides of the comparison.
     pub fn between(expected: &Path, got: &Path) -> Self {
         Self {
             between: Some([expected, got].map(|path| path.display().to_string())),
@@ -102,10 +102,10 @@ impl Report {
         self.incomparable.push([name.into(), why.into()]);
     }
 
-    /// Writes the folder's files, and then the HTML file: it is whole or not there.
+    /// Writes the folder's files, and then the HTML file, which is either complete or missing.
     ///
     /// # Errors
-    /// A file that can't be written.
+    /// A file that cannot be written.
     pub fn write(&self, html: &Path) -> anyhow::Result<()> {
         let name = || format!("{} is no name for a report", html.display());
         let mut folder_name = html.file_stem().with_context(name)?.to_owned();
@@ -151,7 +151,7 @@ impl Report {
         }
     }
 
-    /// All that comes before the pairs.
+    /// Returns the start of the page, up to the first pair.
     fn head(&self) -> String {
         let title = escape(&self.title());
         let verdict = match (self.different.len(), self.incomparable.len()) {
@@ -200,7 +200,7 @@ impl Report {
         page
     }
 
-    /// The table of contents.
+    /// Adds the table of contents.
     fn contents(&self, page: &mut String) {
         *page += "<nav class=\"card\">\n<table class=\"contents\">\n<thead><tr><th>pair</th>\
                   <th class=\"n\">pixels that differ</th><th></th><th class=\"n\">palette entries</th>\
@@ -233,7 +233,7 @@ impl Report {
     }
 }
 
-/// What the colours mean, and how large the pictures are.
+/// The legend of the colours, and the controls for the frames' scale.
 const LEGEND: &str = r#"<aside class="bar">
 <ul class="legend" aria-label="Colours of the difference images">
 <li><i class="ramp"></i>differs: near to far in colour</li>
@@ -251,9 +251,9 @@ const LEGEND: &str = r#"<aside class="bar">
 </aside>
 "#;
 
-/// Two pictures to be shown side by side.
+/// A pair of images to show side by side, with their difference.
 struct View {
-    /// Of the files' names.
+    /// Part of the files' names.
     suffix: &'static str,
     title: Option<&'static str>,
     expected: Indexed,
@@ -311,7 +311,7 @@ impl Pair {
         }
     }
 
-    /// Writes the pair's files by `put`, and adds its section to the page.
+    /// Writes the pair's files with `put`, and adds the pair's section to the page.
     fn section(
         &self,
         page: &mut String,
@@ -365,7 +365,7 @@ impl Pair {
         Ok(())
     }
 
-    /// The first pixels that differ, and their values.
+    /// Lists the first pixels that differ, with their values.
     fn list_pixels(&self, page: &mut String) {
         let Some(pixels) = &self.difference.pixels else {
             return;
@@ -428,7 +428,7 @@ impl Pair {
         *page += "</tbody>\n</table>\n</details>\n";
     }
 
-    /// The palette's entries that differ.
+    /// Lists the palette entries that differ.
     fn list_palette(&self, page: &mut String) {
         let Some(colours) = &self.difference.palette else {
             return;
@@ -456,7 +456,7 @@ impl Pair {
 }
 
 impl View {
-    /// The three pictures, side by side.
+    /// Adds the three images, side by side.
     fn figures(&self, page: &mut String, name: &str, url: &str) {
         let (width, height) = (self.expected.width.max(1), self.expected.height.max(1));
         if let Some(title) = self.title {
@@ -504,7 +504,7 @@ impl View {
         *page += "</div>\n";
     }
 
-    /// The box around what differs, on each page.
+    /// Returns a bounding box of the differences for each page that has any, as HTML.
     fn bounds(&self) -> String {
         let (width, height) = (self.expected.width, self.expected.height);
         let lines = self.shape.memory.unwrap_or(height);
@@ -530,7 +530,7 @@ impl View {
     }
 }
 
-/// A box, as an outline over a picture.
+/// Returns a box as an outline over an image of `width` x `height` pixels, as HTML.
 fn bounds(bounds: &Bounds, width: usize, height: usize) -> String {
     let Bounds { x0, x1, y0, y1 } = *bounds;
     let share = |part: usize, whole: usize| 100.0 * part as f64 / whole as f64;
@@ -543,7 +543,7 @@ fn bounds(bounds: &Bounds, width: usize, height: usize) -> String {
     )
 }
 
-/// All of video memory as a picture whose lines are the dump's.
+/// Returns all of video memory as an image whose lines are the dump's lines.
 fn whole(dump: &Dump) -> Indexed {
     let width = usize::from(dump.header.width);
     let height = dump.pixels.len().div_ceil(width);
@@ -564,7 +564,7 @@ fn palette(subject: &Subject) -> &[Rgb6] {
     }
 }
 
-/// The expected picture as a dim grey one, and bright what differs from it.
+/// Returns the expected frame in dim grey, with the differing pixels in bright colours.
 fn difference(expected: &Indexed, got: &Indexed) -> Screen {
     let colour = |picture: &Indexed, index: u8| {
         let colour = picture.palette.get(usize::from(index));
@@ -602,7 +602,7 @@ fn between_near_and_far(from: Rgb6, to: Rgb6) -> [u8; 3] {
     })
 }
 
-/// A colour and its parts; or that there is none.
+/// A colour as a sample and its components, or `nothing` for a missing colour.
 struct Swatch(Option<Rgb6>);
 
 impl fmt::Display for Swatch {
@@ -615,7 +615,7 @@ impl fmt::Display for Swatch {
     }
 }
 
-/// Names of files, no two alike on any file system.
+/// File names that are unique on any file system, even one that ignores case.
 #[derive(Default)]
 struct Names(HashSet<String>);
 
@@ -623,7 +623,7 @@ impl Names {
     fn take(&mut self, name: &str) -> String {
         let mut plain = String::new();
         for c in name.chars().take(MAX_NAME) {
-            // Neither hidden nor like an option.
+            // A name must not begin with `.`, which hides the file, or with `-`, which looks like an option.
             match c {
                 'a'..='z' | 'A'..='Z' | '0'..='9' | '_' => plain.push(c),
                 '.' if !plain.is_empty() => plain.push(c),
@@ -651,7 +651,7 @@ fn percent(count: usize, of: usize) -> String {
     }
 }
 
-/// Text for HTML, in an attribute's quotes too.
+/// Escapes text for HTML, including an attribute's quotes.
 fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -667,9 +667,9 @@ fn escape(text: &str) -> String {
     escaped
 }
 
-/// A name as a part of a relative address.
+/// Returns a file name as part of a relative URL.
 fn url(name: &OsStr) -> String {
-    // A name with a colon would be a scheme.
+    // Without `./`, the part of a name before a colon would be a URL scheme.
     let mut url = String::from("./");
     for &byte in name.as_bytes() {
         match byte {
@@ -744,7 +744,7 @@ mod tests {
         }
         assert!(page.contains("<dt>&lt;i&gt;</dt><dd>&lt;u&gt;</dd>"));
         assert!(page.contains("../&lt;b&gt;&amp;&quot;&#39;/x"));
-        // Every file that is named is there, and the other way round.
+        // Every file that the page names exists, and the page names every file.
         let files = folder.path().join("a b%#é-files");
         let files = fs::read_dir(files).unwrap();
         let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());

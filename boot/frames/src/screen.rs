@@ -1,25 +1,25 @@
-//! A picture of the screen, as QEMU's `screendump` gives it.
+//! An image of the screen, in the form of QEMU's `screendump`.
 
 use std::io::Write;
 
 use anyhow::{Context, bail};
 
-/// What the monitor shows: 8 bits each of red, green and blue, row by row.
+/// The image that the monitor shows: 8 bits each of red, green and blue, row by row.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Screen {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: usize,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: usize,
     /// `width * height` pixels.
     pub pixels: Vec<[u8; 3]>,
 }
 
 impl Screen {
-    /// Reads a binary PPM with 8 bits a colour: the one format that every QEMU writes.
+    /// Reads a binary PPM with 8 bits per colour, the only format that every QEMU writes.
     ///
     /// # Errors
-    /// Anything else, and a file that is cut short.
+    /// Any other data, and a file that is cut short.
     pub fn from_ppm(bytes: &[u8]) -> anyhow::Result<Self> {
         let mut parts = bytes.splitn(4, |byte| byte.is_ascii_whitespace());
         let mut word = || std::str::from_utf8(parts.next()?).ok();
@@ -48,7 +48,7 @@ impl Screen {
     /// Writes a PNG.
     ///
     /// # Errors
-    /// What the writer says.
+    /// The writer's error.
     pub fn write_png(&self, to: impl Write) -> anyhow::Result<()> {
         let (width, height) = (self.width.try_into()?, self.height.try_into()?);
         let mut encoder = png::Encoder::new(to, width, height);

@@ -1,7 +1,7 @@
-//! `dump` and `emulate`: pictures as files, a text dump and a PNG of each.
+//! The `dump` and `emulate` commands: write frames as files, a text dump and a PNG of each.
 //!
-//! The show is held anew before each picture, so a dump depends on its picture alone and not on
-//! which others were asked for: the same bytes come out in any order, from either card.
+//! The demo is held and reset before each frame, so a dump depends only on its frame and not on the other
+//! frames in the request. The bytes are the same in any order, and from either VGA.
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
@@ -15,17 +15,17 @@ use crate::look::Look;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 
-/// Which pictures, how much of the card, and where to.
+/// Which frames to write, how much of video memory, and where to.
 #[derive(Args, Clone, Debug)]
 pub struct Frames {
     #[command(flatten)]
     which: Which,
-    /// Draw in reduced quality, as a solid that moves by so much a tick: the changes of the angles
-    /// and of the distance, each in hex and modulo 2^32, as a dump's line `motion` has them
+    /// Draw in reduced quality, as for a solid that moves this much in one tick: the changes of the three
+    /// angles and of the distance, in hex and modulo 2^32, as on the line `motion` of a dump
     #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
         value_parser = hex, action = ArgAction::Set)]
     motion: Option<Vec<u32>>,
-    /// All of video memory, 4 x 64 KiB, and not only the page on the screen
+    /// Write all of video memory, 4 x 64 KiB, instead of only the page on the screen
     #[arg(long)]
     all: bool,
     /// The folder to write to
@@ -36,29 +36,29 @@ pub struct Frames {
 #[derive(Args, Clone, Debug)]
 #[group(required = true, multiple = true)]
 struct Which {
-    /// The frame with this number; may be given again
+    /// The frame with this number; can be repeated
     #[arg(long = "frame", value_name = "N")]
     single: Vec<u32>,
-    /// Frames A up to B, without B (with it: A..=B)
+    /// Frames A up to B, excluding B (A..=B includes B)
     #[arg(long = "frames", value_name = "A..B", value_parser = range)]
     ranges: Vec<RangeInclusive<u32>>,
-    /// The solid in this pose: angles as 32-bit fractions of a turn and the distance in 16.16,
-    /// each in hex, as the descriptions in tests/golden have them
+    /// The solid in this pose: yaw, pitch and roll as 32-bit fractions of a turn and the distance in 16.16
+    /// fixed point, in hex, as in the descriptions in tests/golden
     #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
         value_parser = hex)]
     pose: Vec<u32>,
 }
 
-/// Reads up to eight hex digits.
+/// Parses up to eight hex digits.
 fn hex(text: &str) -> Result<u32, String> {
-    // `from_str_radix` would take a plus sign.
+    // `from_str_radix` would accept a plus sign.
     if !text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
         return Err("a hex number has the digits 0 to 9 and a to f".into());
     }
     u32::from_str_radix(text, 16).map_err(|error| error.to_string())
 }
 
-/// Reads `A..B` or `A..=B`.
+/// Parses `A..B` or `A..=B`.
 pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
     let parts = text.split_once("..");
     let (first, last) = parts.ok_or("two frame numbers are written A..B, or A..=B")?;
@@ -77,7 +77,7 @@ pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
 }
 
 impl Frames {
-    /// How many pictures, and each of them.
+    /// Returns the number of frames, and the frames.
     fn pictures(&self) -> (u64, impl Iterator<Item = Picture>) {
         let Which {
             single,
@@ -102,7 +102,7 @@ impl Frames {
         (count, pictures)
     }
 
-    /// The motion, if there is one.
+    /// Returns the motion, if the user named one.
     fn motion(&self) -> Option<Motion> {
         let &[yaw, pitch, roll, distance] = self.motion.as_deref()? else {
             return None;
@@ -115,11 +115,11 @@ impl Frames {
         })
     }
 
-    /// Has each picture shown by `card`, drawn as `look` says, and writes its dump and its PNG; `wrote` is told the path
-    /// of each.
+    /// Shows each frame on `card`, drawn with the options in `look`, and writes its dump and its PNG. `wrote`
+    /// receives the path of each file.
     ///
     /// # Errors
-    /// When the card fails or a file can't be written; what was written before is whole.
+    /// The VGA fails or a file cannot be written; the files written before are complete.
     pub fn write(
         &self,
         card: &mut impl Card,
@@ -159,7 +159,8 @@ impl Frames {
     }
 }
 
-/// The name of a picture's files: numbers padded, so that a folder sorts by frame.
+/// Returns the name of a frame's files, without an extension. Numbers are padded, so that a folder sorts by
+/// frame.
 fn stem(picture: Picture, motion: Option<Motion>, content: Content) -> String {
     let mut name = match picture {
         Picture::Frame(frame) => format!("frame-{frame:06}"),
@@ -189,7 +190,7 @@ mod tests {
     use crate::dump::Dump;
     use crate::look::Named;
 
-    /// From the log of a show in reduced quality to a header, and from the header to the same bytes.
+    /// Takes the motion of a frame in reduced quality from its header, and draws the same bytes again.
     #[test]
     fn a_frame_of_reduced_quality_is_drawn_again_from_its_header() {
         let mut memory = card::memory();
@@ -244,7 +245,7 @@ mod tests {
         let whole = drawn(None);
         assert_eq!(whole.header.motion, None);
         assert!(whole.pixels != shown.pixels);
-        // Two qualities of a frame do not overwrite each other.
+        // The same frame in both qualities gives different files: neither overwrites the other.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
     }
 

@@ -18,26 +18,26 @@ use super::Config;
 use super::run::Event;
 use system::child;
 
-/// QEMU's ends of the sockets, as its command line names them.
+/// File descriptors of QEMU's ends of the sockets, as its command line names them.
 const CONTROL: i32 = 3;
 const SERIAL: i32 = 4;
 
-/// Moves the sockets from standard input and output to [`CONTROL`] and [`SERIAL`].
+/// A shell script that moves the sockets from standard input and output to [`CONTROL`] and [`SERIAL`].
 ///
-/// The standard library hands a child no other descriptors than the standard ones. A descriptor
-/// that every child inherits would also reach the children of other threads, and a socket's end
-/// would then not be seen.
+/// The standard library passes only the standard descriptors to a child. A descriptor that every child
+/// inherits would also reach the children of other threads, and this program would then not notice that QEMU
+/// has closed its end.
 const MOVE_SOCKETS: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >&2"#;
 
-/// The option that names an accelerator on its own.
+/// Options that choose an accelerator, besides `-machine accel=`.
 const ACCELERATOR_OPTIONS: [&str; 4] = ["accel", "enable-kvm", "enable-hax", "enable-hvf"];
 
-/// QEMU's arguments.
+/// Returns QEMU's arguments.
 pub fn arguments(config: &Config) -> Vec<OsString> {
     let mut words: Vec<OsString> = Vec::new();
     let mut add = |more: &[&str]| words.extend(more.iter().map(OsString::from));
     add(&["-name", "Crystal Ball", "-net", "none", "-S"]);
-    // QEMU takes the first `-accel` that works, so ours must not stand before the user's.
+    // QEMU uses the first `-accel` that works, so this program's must not precede the user's.
     if !names_accelerator(&config.arguments) {
         add(&["-accel", "tcg"]);
     }
@@ -47,9 +47,9 @@ pub fn arguments(config: &Config) -> Vec<OsString> {
         "if=none,id=crystal-ball,format=raw,readonly=on,file={}",
         escaped(&config.image)
     );
-    // virtio: the BIOS reads an IDE disk through a port, and waits for a thread of QEMU at every
-    // few sectors. A boot then takes twice the time alone, and ten times on a busy machine.
-    // bootindex=1: the user's other disks, which have none, do not boot before the image.
+    // virtio: from an IDE disk the BIOS reads through a port, and waits for a thread of QEMU at every few
+    // sectors. The boot then needs twice the time on a quiet machine, and ten times on a busy machine.
+    // bootindex=1: the user's other disks have no bootindex and do not boot before the image.
     let disk = "virtio-blk-pci,drive=crystal-ball,bootindex=1";
     add(&["-drive", &image, "-device", disk]);
     let control = format!("socket,id=crystal-ball-qmp,fd={CONTROL}");
@@ -62,17 +62,17 @@ pub fn arguments(config: &Config) -> Vec<OsString> {
     words
 }
 
-/// A path as the value of a QEMU option: QEMU reads two commas as one.
+/// Escapes a path for the value of a QEMU option: QEMU reads two commas as one.
 fn escaped(path: &Path) -> String {
     path.to_string_lossy().replace(',', ",,")
 }
 
-/// The name of an option, without its dashes: QEMU takes one or two.
+/// Returns the name of an option without its dashes. QEMU accepts one dash or two.
 pub fn option(word: &str) -> Option<&str> {
     word.strip_prefix("--").or_else(|| word.strip_prefix('-'))
 }
 
-/// Whether the arguments name an accelerator, in any of QEMU's spellings.
+/// Returns whether the arguments choose an accelerator, in any of QEMU's spellings.
 pub fn names_accelerator(arguments: &[OsString]) -> bool {
     let words: Vec<_> = arguments
         .iter()
@@ -88,22 +88,23 @@ pub fn names_accelerator(arguments: &[OsString]) -> bool {
     })
 }
 
-/// The host's ends of a started QEMU.
+/// A started QEMU: its process, and the host's ends of its sockets.
 pub struct Started {
     pub process: Pid,
     pub control: UnixStream,
     pub serial: UnixStream,
 }
 
-/// Starts QEMU on a thread that lives as long as QEMU: the signal that ends QEMU with this program
-/// is tied to the thread that started it. That thread sends QEMU's words and its end.
+/// Starts QEMU on a thread that lives as long as QEMU. If this program dies, a signal ends QEMU, and that
+/// signal is tied to the thread that started QEMU. The thread sends QEMU's output and its exit status as
+/// events.
 pub fn start(qemu: &Path, arguments: &[OsString], send: Sender<Event>) -> anyhow::Result<Started> {
     let (control, qemu_control) = UnixStream::pair().context("no socket for QEMU")?;
     let (serial, qemu_serial) = UnixStream::pair().context("no socket for QEMU")?;
     let mut command = child::command("sh");
     command.args(["-c", MOVE_SOCKETS, "sh"]);
     command.arg(qemu).args(arguments);
-    // A process group of its own: Ctrl-C is for this program, which then ends QEMU.
+    // A separate process group: Ctrl-C reaches this program, which then ends QEMU.
     command
         .process_group(0)
         .stdin(OwnedFd::from(qemu_control))
@@ -112,7 +113,8 @@ pub fn start(qemu: &Path, arguments: &[OsString], send: Sender<Event>) -> anyhow
     let (started, wait) = mpsc::channel();
     thread::spawn(move || {
         let spawned = command.spawn();
-        // It holds QEMU's ends of the sockets: their other ends would never be closed.
+        // `command` holds QEMU's ends of the sockets. While it lives, this program does not see that QEMU has
+        // closed them.
         drop(command);
         let mut child = match spawned {
             Ok(child) => child,
@@ -137,7 +139,7 @@ pub fn start(qemu: &Path, arguments: &[OsString], send: Sender<Event>) -> anyhow
     })
 }
 
-/// The command line as a shell reads it.
+/// Returns the command line as a user would type it in a shell.
 pub fn line(qemu: &Path, arguments: &[OsString]) -> String {
     child::line(Command::new(qemu).args(arguments)) + "\n"
 }

@@ -1,16 +1,18 @@
-//! A running QEMU with our image in it: booted, talked to, and judged.
+//! Boots the image in QEMU, talks to the kernel, and judges how the run ended.
 //!
-//! The verdict is made out here, so that a crash of the kernel is a result and not an accident.
-//! Three sources decide it, and QEMU's exit code 0 is none of them, since a triple fault, a
-//! closed window and a killed QEMU all end that way:
+//! The verdict is made on the host, so that a crash of the kernel is a result with a name. It has three
+//! sources:
 //!
-//! - the serial line: what the kernel said, and its last words;
+//! - the serial line: the kernel's lines, and its report when it fails;
 //! - QMP, QEMU's control socket: the reason of the `SHUTDOWN` event;
 //! - the code that the kernel wrote to `isa-debug-exit`.
 //!
-//! QEMU runs with `-no-reboot -no-shutdown`: after a reset it stands still instead of leaving, so
-//! a last screendump can be taken. Threads only read (serial, QMP, QEMU's words, its end) and
-//! feed one channel; everything is decided on the caller's thread.
+//! QEMU's exit code 0 is not a source: a triple fault, a closed window and a QEMU that was ended by a signal
+//! all give it.
+//!
+//! QEMU runs with `-no-reboot -no-shutdown`: after a reset it keeps the machine stopped and does not exit, so
+//! a last screendump can be taken. Threads only read (the serial line, QMP, QEMU's output, its exit status)
+//! and feed one channel. The caller's thread makes every decision.
 
 mod command;
 mod qmp;
@@ -47,28 +49,29 @@ use setup::Ready;
 use system::quote::quoted;
 use system::{Interrupted, interrupted};
 
-/// How often a running show is asked for a sign of life.
+/// How often [`Machine::watch`] checks that the running demo still answers.
 const HEARTBEAT: Duration = Duration::from_secs(5);
-/// How often waiting looks up, for Ctrl-C.
+/// Longest wait between two checks for Ctrl-C.
 const LOOK_UP: Duration = Duration::from_millis(50);
 
 /// How long a run may keep this program waiting.
 ///
-/// A limit counts the processor time that QEMU uses; a QEMU that idles reaches it by the clock,
-/// and 15 times the limit by the clock is the end in any case.
+/// A limit counts the processor time that QEMU uses. An idle QEMU reaches the limit by wall time, and after
+/// 15 times the limit of wall time the wait ends in any case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// From QEMU's start to the kernel's first line.
     pub boot: Duration,
-    /// For each answer of the kernel and of QEMU, and for QEMU's end.
+    /// For each answer of the kernel or of QEMU, and for QEMU's end.
     pub answer: Duration,
-    /// For a user who has paused the machine while this program waits for an answer, by the clock.
+    /// For a user's pause of the machine while this program waits for an answer; wall time.
     pub pause: Duration,
 }
 
 impl Default for Limits {
-    /// At least ten times what each takes on a quiet machine: 1.2 s for a boot (2.5 s from an IDE
-    /// disk), 1 s for a dump of all video memory. A pause may last an hour.
+    /// Returns at least ten times the time of each step on a quiet machine: 1.2 s for a boot, 1 s for a
+    /// dump of all video memory. (A boot from an IDE disk, which this crate does not use, needs 2.5 s.) A
+    /// pause may last an hour.
     fn default() -> Self {
         Self {
             boot: Duration::from_secs(20),
@@ -85,23 +88,24 @@ pub struct Config {
     pub qemu: PathBuf,
     /// The disk image.
     pub image: PathBuf,
-    /// QEMU's `-vga`.
+    /// The value of QEMU's `-vga`.
     pub vga: String,
-    /// QEMU's `-display`; `none` without a window.
+    /// The value of QEMU's `-display`; `none` for no window.
     pub display: String,
-    /// The checksum of the pack that the kernel has to take. Without one it need not, and what it
-    /// says of it is kept ([`Machine::said_of_pack`]).
+    /// The checksum of the model file that the kernel must accept. If it is `None`, the kernel may refuse the
+    /// model file; its answer is kept either way ([`Machine::said_of_pack`]).
     pub pack: Option<u32>,
     /// More arguments for QEMU.
     pub arguments: Vec<OsString>,
-    /// Where the evidence of a failure is kept, in a folder of its own each time.
+    /// The folder for evidence: each failure gets a new folder in it.
     pub failures: PathBuf,
     /// How long to wait for the machine.
     pub limits: Limits,
 }
 
 impl Config {
-    /// The image on QEMU's standard adapter, without a window; evidence is kept beside the image.
+    /// Returns the configuration for the image on QEMU's standard adapter, without a window. Evidence is kept
+    /// in a folder beside the image.
     pub fn new(ready: &Ready) -> Self {
         Self {
             qemu: ready.qemu.path.clone(),
@@ -116,10 +120,10 @@ impl Config {
     }
 }
 
-/// A QEMU that runs our image. Dropping it ends QEMU.
+/// A QEMU that runs the image. Dropping it ends QEMU.
 ///
-/// Nothing of it has a name in the file system: its sockets are inherited, and its log and
-/// screendumps are files without a name. So nothing is left of it, whatever ends this program.
+/// Nothing remains in the file system, however this program ends: QEMU inherits its sockets, and the log and
+/// the screendumps are files without a name.
 #[derive(Debug)]
 pub struct Machine {
     events: Receiver<Event>,
@@ -130,13 +134,15 @@ pub struct Machine {
     evidence: Evidence,
     failures: PathBuf,
     limits: Limits,
-    /// QEMU's time to end, once the machine is off.
+    /// The watchdog for QEMU's end, once the machine is off.
     ending: Option<Watchdog>,
     run: Run,
 }
 
-/// What QEMU printed in place of running the machine, because its arguments asked for that
-/// (`-machine help`). It is an error so that it ends whatever wanted a machine; it is no failure.
+/// The text that QEMU printed when its arguments asked for a list (`-machine help`) and it started no
+/// machine.
+///
+/// It is an error, so that it ends the caller's work on the machine, but it is not a failure.
 #[derive(Debug)]
 pub struct Printed(pub String);
 
@@ -152,14 +158,14 @@ impl Machine {
     /// Starts QEMU and waits for the kernel's first line.
     ///
     /// # Errors
-    /// A [`Failure`] with the verdict; [`Printed`], if QEMU was asked for a list only; why QEMU
-    /// could not be started at all.
+    /// A [`Failure`] with the verdict; [`Printed`] if QEMU's arguments asked only for a list; the reason if
+    /// QEMU could not be started.
     pub fn boot(config: &Config) -> anyhow::Result<Self> {
         Self::boot_through(config, |serial| serial)
     }
 
-    /// As [`Machine::boot`], with someone in the middle of the serial line: `tap` takes QEMU's
-    /// line and returns the one that is used in its place.
+    /// Starts QEMU like [`Machine::boot`], with an intermediary on the serial line: `tap` receives QEMU's end
+    /// of the line and returns the stream to use in its place.
     ///
     /// # Errors
     /// As [`Machine::boot`].
@@ -178,10 +184,10 @@ impl Machine {
         let arguments = command::arguments(config);
         let started = command::start(&config.qemu, &arguments, send.clone())?;
         let (control, serial) = (started.control, tap(started.serial));
-        // A reader that stands still must not keep this program from looking up.
+        // If the other side stops reading, a write must not block the checks for Ctrl-C.
         control.set_write_timeout(Some(LOOK_UP))?;
         serial.set_write_timeout(Some(LOOK_UP))?;
-        // A full disk costs the log, not the run.
+        // On a full disk only the log is lost; the run continues.
         let log = tempfile::tempfile().ok();
         read_control(control.try_clone()?, send.clone());
         read_serial(
@@ -221,7 +227,7 @@ impl Machine {
         Ok(machine)
     }
 
-    /// Waits until the kernel has taken the pack of this checksum.
+    /// Waits until the kernel has accepted the model file with this checksum.
     fn wait_for_pack(&mut self, pack: u32) -> anyhow::Result<()> {
         let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         while self.run.pack.is_none() {
@@ -240,23 +246,23 @@ impl Machine {
         }
     }
 
-    /// What the kernel has said of its ramdisk's pack: that it was taken, or why it was refused.
+    /// Returns the kernel's line about the model file in its ramdisk: accepted, or refused with the reason.
     pub fn said_of_pack(&self) -> Option<&str> {
         self.run.pack.as_deref()
     }
 
-    /// QEMU's process.
+    /// Returns QEMU's process ID.
     pub fn process(&self) -> u32 {
         self.process.as_raw_nonzero().get().unsigned_abs()
     }
 
-    /// Returns how long QEMU's threads have been ready to run without a processor, in all. On a quiet machine
-    /// this hardly grows.
+    /// Returns the total time that QEMU's threads have been ready to run without a processor. On a quiet
+    /// machine it hardly grows.
     pub fn starved_time(&self) -> Duration {
         watchdog::starved_time(self.process)
     }
 
-    /// Waits until the running show's first picture is on the screen.
+    /// Waits until the running demo's first frame is on the screen.
     ///
     /// # Errors
     /// A [`Failure`].
@@ -277,15 +283,15 @@ impl Machine {
         Ok(())
     }
 
-    /// Changes the limits of all that is waited for from now on.
+    /// Changes the limits of all later waits.
     pub fn set_limits(&mut self, limits: Limits) {
         self.limits = limits;
     }
 
-    /// Lets the show run for a while.
+    /// Lets the demo run for `time`.
     ///
     /// # Errors
-    /// A [`Failure`], if it ends meanwhile.
+    /// A [`Failure`] if the run ends within that time.
     pub fn rest(&mut self, time: Duration) -> anyhow::Result<()> {
         let by = Instant::now() + time;
         while Instant::now() < by {
@@ -294,7 +300,7 @@ impl Machine {
         Ok(())
     }
 
-    /// Sends bytes as they are.
+    /// Sends bytes unchanged, without a checksum.
     ///
     /// # Errors
     /// A [`Failure`]; a hang if the kernel does not read for too long.
@@ -316,7 +322,7 @@ impl Machine {
                     }
                 }
                 Err(error) => {
-                    // What has ended QEMU is the better error.
+                    // If QEMU has ended, the reason of its end is the better error.
                     self.rest(self.limits.answer)?;
                     return Err(error).context("the serial line is closed");
                 }
@@ -337,7 +343,7 @@ impl Machine {
         self.send_raw(&framed)
     }
 
-    /// The lines of the next answer, up to the one that closes it. `asked` names it in errors.
+    /// Returns the lines of the next answer, including the closing line. Errors name the answer by `asked`.
     ///
     /// # Errors
     /// A [`Failure`]; a hang if no answer comes in time.
@@ -347,7 +353,7 @@ impl Machine {
         loop {
             while let Some(line) = self.run.lines.pop_front() {
                 let closes = [OK, ERROR].contains(&first_word(&line));
-                // Said on its own, between answers.
+                // The kernel sends this line between answers, not as part of an answer.
                 if line != RUNNING {
                     answer.push(line);
                 }
@@ -363,10 +369,10 @@ impl Machine {
         }
     }
 
-    /// Switches a trace event of QEMU's on or off; where the events go is for QEMU's arguments.
+    /// Switches one of QEMU's trace events on or off. QEMU's arguments decide where the trace goes.
     ///
     /// # Errors
-    /// A [`Failure`], or what QEMU says.
+    /// A [`Failure`], or QEMU's error.
     pub fn trace(&mut self, event: &str, on: bool) -> anyhow::Result<()> {
         let arguments = json!({ "name": event, "enable": on });
         let answer = self.control("trace-event-set-state", arguments)?;
@@ -376,10 +382,10 @@ impl Machine {
         }
     }
 
-    /// Pushes a key down or lets it go, by QEMU's name for it: `left`, `m`, `kp_add`.
+    /// Presses or releases a key. `name` is QEMU's name for the key: `left`, `m`, `kp_add`.
     ///
     /// # Errors
-    /// A [`Failure`], or what QEMU says.
+    /// A [`Failure`], or QEMU's error.
     pub fn key(&mut self, name: &str, down: bool) -> anyhow::Result<()> {
         let key = json!({ "down": down, "key": { "type": "qcode", "data": name } });
         let events = json!({ "events": [{ "type": "key", "data": key }] });
@@ -390,7 +396,7 @@ impl Machine {
         }
     }
 
-    /// Asks the kernel to leave, and waits until QEMU has ended by it.
+    /// Sends the kernel `leave`, and waits until QEMU has ended because of it.
     ///
     /// # Errors
     /// A [`Failure`] for any other end.
@@ -400,9 +406,11 @@ impl Machine {
         self.run_to_the_end()
     }
 
-    /// Lets the show run until the user ends it or it fails, and asks now and then whether the
-    /// kernel still lives, or QEMU, while the user has paused the machine. Always a [`Failure`] in
-    /// the end: closing the window is one, by name.
+    /// Lets the demo run until the user ends it or it fails.
+    ///
+    /// Every few seconds the kernel must answer a command; while the user has paused the machine, QEMU must
+    /// answer instead. The result is always an error: a closed window is the [`Failure`] with
+    /// [`Verdict::User`].
     ///
     /// # Errors
     /// The [`Failure`].
@@ -418,10 +426,10 @@ impl Machine {
         }
     }
 
-    /// Waits until QEMU ends, whatever ends it.
+    /// Waits until QEMU ends, for whatever reason.
     ///
     /// # Errors
-    /// A [`Failure`], unless the kernel left as it was asked to.
+    /// A [`Failure`], unless the kernel left on command.
     pub fn wait_for_end(mut self) -> anyhow::Result<()> {
         self.run_to_the_end()
     }
@@ -447,7 +455,7 @@ impl Machine {
         let id = match self.control.send(execute, arguments) {
             Ok(id) => id,
             Err(error) => {
-                // What has ended QEMU is the better error.
+                // If QEMU has ended, the reason of its end is the better error.
                 self.rest(self.limits.answer)?;
                 return Err(error).context("QEMU's control socket is closed");
             }
@@ -468,7 +476,8 @@ impl Machine {
         }
     }
 
-    /// QMP's greeting, and the machine's start: QEMU waits with `-S` until no event can be missed.
+    /// Completes QMP's greeting and starts the machine. QEMU was started with `-S`, so the machine has waited
+    /// until no event could be missed.
     fn negotiate(&mut self) -> anyhow::Result<()> {
         self.control("qmp_capabilities", json!({}))?;
         self.control("cont", json!({}))?;
@@ -476,8 +485,10 @@ impl Machine {
         Ok(())
     }
 
-    /// Takes in one event. False when `watchdog` is over before there was one, or when events have
-    /// come for far longer than that.
+    /// Handles one event and returns true.
+    ///
+    /// Returns false if `watchdog` is over before an event comes, or if events keep coming beyond the
+    /// watchdog's ceiling.
     fn pump_or_wait(&mut self, watchdog: &mut Watchdog) -> anyhow::Result<bool> {
         while !self.pump(Instant::now() + LOOK_UP)? {
             if self.is_over(watchdog) {
@@ -487,8 +498,8 @@ impl Machine {
         Ok(!watchdog.is_past_ceiling())
     }
 
-    /// Whether `watchdog` is over. A user's pause, as QEMU's window can make one, suspends it, but
-    /// has a limit of its own.
+    /// Returns whether `watchdog` is over. A pause, which a user can start from QEMU's window, renews the
+    /// watchdog and has a separate limit.
     fn is_over(&self, watchdog: &mut Watchdog) -> bool {
         match self.run.paused {
             Some(since) => {
@@ -499,7 +510,7 @@ impl Machine {
         }
     }
 
-    /// Takes in one event. True if there was one before `by`.
+    /// Handles one event. Returns whether an event came before `by`.
     ///
     /// # Errors
     /// A [`Failure`] as soon as one is certain.
@@ -529,9 +540,9 @@ impl Machine {
         Ok(true)
     }
 
-    /// Takes in an event and does what it asks for.
+    /// Handles an event and carries out the action that follows from it.
     fn take(&mut self, event: Event) {
-        // What cannot be sent goes to a QEMU that is ending: its end is the next event.
+        // If a write fails, QEMU is ending, and the next event is its end.
         match self.run.take(event) {
             Some(Act::Quit) => {
                 let _ = self.control.send("quit", json!({}));
@@ -549,7 +560,7 @@ impl Machine {
         }
     }
 
-    /// The failure that an end, or a reset, amounts to.
+    /// Returns the error for a run that has ended or was reset.
     fn judge(&mut self) -> anyhow::Error {
         if let Some(text) = self.run.printed() {
             return Printed(text).into();
@@ -560,7 +571,7 @@ impl Machine {
         }
     }
 
-    /// Ends QEMU and makes an error of the verdict, the evidence kept.
+    /// Ends QEMU, keeps the evidence, and returns the verdict as an error.
     fn fail(&mut self, mut verdict: Verdict) -> anyhow::Error {
         if verdict == Verdict::User {
             return Failure::plain(verdict).into();
@@ -575,7 +586,7 @@ impl Machine {
         Failure::keep(verdict, &self.evidence, &self.failures).into()
     }
 
-    /// What the machine is like, as far as QEMU still says.
+    /// Asks QEMU about the machine: memory, CPU, text screen. An answer that does not come is left empty.
     fn examine(&mut self) -> Found {
         let memory = self.request("query-memory-size-summary", json!({}));
         let cpus = self.request("query-cpus-fast", json!({}));
@@ -595,8 +606,11 @@ impl Machine {
         }
     }
 
-    /// What QEMU returns to a command, if it still does, whatever else happens meanwhile: for the
-    /// evidence of a verdict that is certain.
+    /// Sends a command to QEMU and returns what it replies, or `None` if QEMU ends or does not answer in
+    /// time.
+    ///
+    /// Other events are processed meanwhile and cannot fail this call: it collects evidence for a verdict
+    /// that is already certain.
     fn request(&mut self, execute: &str, arguments: Value) -> Option<Value> {
         let id = self.control.send(execute, arguments).ok()?;
         let by = Instant::now() + self.limits.answer;
@@ -612,7 +626,7 @@ impl Machine {
         None
     }
 
-    /// The same for a command that writes a file.
+    /// Sends a command that writes a file, as [`Machine::request`] does, and returns the file's bytes.
     fn request_file(&mut self, execute: &str, mut arguments: Value) -> Option<Vec<u8>> {
         let mut file = Nameless::new().ok()?;
         arguments["filename"] = file.path().into();
@@ -620,20 +634,20 @@ impl Machine {
         file.bytes().ok()
     }
 
-    /// Takes a last screendump, if QEMU still can.
+    /// Takes a last screendump if QEMU still can, and keeps it unless one was kept before.
     fn keep_screen(&mut self) {
         let bytes = self.request_file("screendump", json!({}));
         let screen = bytes.and_then(|bytes| Screen::from_ppm(&bytes).ok());
-        // The screen at the first report is the one to look at.
+        // The first screen, taken when the report came, is the one to look at.
         if self.evidence.screen.is_none() {
             self.evidence.screen = screen;
         }
     }
 
-    /// Kills QEMU, if it has not ended, and waits until it has.
+    /// Kills QEMU if it has not ended, and waits for its end.
     fn end(&mut self) {
         while self.run.ended.is_none() {
-            // QEMU, and all of it where --qemu names a script that starts one.
+            // The whole process group: `--qemu` may name a script that starts QEMU.
             let _ = kill_process_group(self.process, Signal::KILL);
             match self.events.recv_timeout(self.limits.answer) {
                 Ok(event) => drop(self.run.take(event)),
@@ -643,7 +657,7 @@ impl Machine {
     }
 }
 
-/// A file without a name, for QEMU to write into by way of this process.
+/// A file without a name. QEMU opens it through this process's entry in `/proc`.
 struct Nameless(File);
 
 impl Nameless {
@@ -652,12 +666,12 @@ impl Nameless {
         Ok(Self(file.context("no file in memory")?.into()))
     }
 
-    /// A path that leads to it while this process lives.
+    /// Returns a path to the file. It is valid while this process lives.
     fn path(&self) -> String {
         format!("/proc/{}/fd/{}", std::process::id(), self.0.as_raw_fd())
     }
 
-    /// What is in it.
+    /// Returns the file's contents.
     fn bytes(&mut self) -> std::io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         self.0.read_to_end(&mut bytes)?;
@@ -666,8 +680,7 @@ impl Nameless {
 }
 
 impl Card for Machine {
-    /// Sends the command, and waits for the answer. Errors are a [`Failure`], or the kernel's
-    /// `error`.
+    /// Sends the command and waits for the answer. An error is a [`Failure`], or the kernel's `error` line.
     fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
         self.send_line(&command.to_string())?;
         let mut answer = self.answer(&command.to_string())?;
@@ -680,7 +693,8 @@ impl Card for Machine {
         }
     }
 
-    /// A dump that is not in order is a line that is garbled in a way that no single line shows.
+    /// A malformed dump gives [`Verdict::Garbled`]: the line was garbled in a way that no single line's
+    /// checksum shows.
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
         let lines = self.ask(Command::Dump(content))?;
         Dump::from_lines(&lines).map_err(|error| {
@@ -689,7 +703,7 @@ impl Card for Machine {
         })
     }
 
-    /// By QEMU's `screendump`.
+    /// Returns QEMU's `screendump`.
     fn screen(&mut self) -> anyhow::Result<Screen> {
         let mut file = Nameless::new()?;
         let reply = self.control("screendump", json!({ "filename": file.path() }))?;
@@ -707,7 +721,7 @@ impl Drop for Machine {
     }
 }
 
-/// Not an error: the kernel left because it was asked to.
+/// The kernel left on command. It travels as an error, but it is a success.
 #[derive(Debug, PartialEq, Eq)]
 struct Left;
 
@@ -734,14 +748,16 @@ fn read_control(stream: UnixStream, send: Sender<Event>) {
     });
 }
 
-/// How long bytes gather on the serial line before they are read. QEMU sends each byte in a call of its own,
-/// 100 000 a second; a thread that is woken for each of them takes a core to itself.
+/// How long bytes collect on the serial line between two reads.
+///
+/// QEMU sends each byte in a separate call, up to 100 000 a second. A thread that wakes for each byte keeps a
+/// core busy.
 const GATHERING: Duration = Duration::from_micros(250);
 
-/// Reads the serial line into its log and into lines.
+/// Starts a thread that copies the serial line to `log` and sends its lines as events.
 ///
-/// Before the kernel's first line the firmware may have said anything; after it, every line has
-/// its checksum.
+/// Before the kernel's first valid line the firmware may print anything, so invalid lines are ignored. After
+/// it, every line must have its checksum.
 fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event>) {
     thread::spawn(move || {
         let (mut lines, mut greeted) = (Lines::new(), false);
@@ -764,7 +780,8 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event
                     Err(_) if !greeted => continue,
                     Err(why) => Event::Garbled(why),
                 };
-                // Without a machine nobody reads on, and a flood would keep this thread busy for ever.
+                // The machine was dropped. Without this return, a flood of lines would keep the thread busy
+                // for ever.
                 if send.send(event).is_err() {
                     return;
                 }

@@ -30,7 +30,7 @@ impl Control {
     }
 }
 
-/// Whether QEMU's message is the reply to the command with this `id`.
+/// Returns whether QEMU's message is the reply to the command with this `id`.
 pub fn is_reply(message: &Value, id: u64) -> bool {
     message.get("id").and_then(Value::as_u64) == Some(id)
 }

@@ -1,7 +1,7 @@
-//! What is known of a run, from its events alone, and the verdict that they amount to.
+//! The state of a run, derived from its events alone, and the verdict on it.
 //!
-//! Nothing here waits or talks to QEMU: [`Run::take`] returns what has to be done. So recorded
-//! events of any QEMU version can be judged in a test.
+//! Nothing here waits or talks to QEMU: [`Run::take`] returns the action that the caller must carry out. A
+//! test can therefore judge the recorded events of any QEMU version.
 
 use std::collections::VecDeque;
 use std::process::ExitStatus;
@@ -12,10 +12,10 @@ use serde_json::Value;
 
 use super::verdict::{Found, Verdict};
 
-/// Run states in which QEMU has stopped the machine for a reason of its own, and which no user
-/// ends. The others that stop a machine are the user's pause, a debugger's, or pass.
+/// Run states in which QEMU itself has stopped the machine and that the user does not end. QEMU's other
+/// stopped states are the user's pause, a debugger's stop, and states that pass.
 const QEMU_STOPPED: [&str; 4] = ["guest-panicked", "internal-error", "io-error", "watchdog"];
-/// QEMU's events that explain such a state.
+/// QEMU's events that explain such a state. Their data is kept for the message.
 const TELLING: [&str; 4] = [
     "BLOCK_IO_ERROR",
     "GUEST_PANICKED",
@@ -23,16 +23,16 @@ const TELLING: [&str; 4] = [
     "WATCHDOG",
 ];
 
-/// What happens at QEMU.
+/// An event of a running QEMU.
 #[derive(Debug)]
 pub enum Event {
-    /// A line on the serial line, its checksum right.
+    /// A line on the serial line with a correct checksum.
     Line(String),
-    /// Something else on the serial line, and what is wrong with it.
+    /// Invalid data on the serial line, as a description of the error.
     Garbled(String),
     /// A message on the control socket.
     Control(Value),
-    /// A line of QEMU's output.
+    /// A line of QEMU's standard error, which also receives its standard output.
     Words(String),
     /// QEMU's end.
     Ended(std::io::Result<ExitStatus>),
@@ -42,55 +42,55 @@ pub enum Event {
     ControlClosed,
 }
 
-/// What an event asks for.
+/// The action that an event calls for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Act {
-    /// End QEMU by `quit`: the machine is off, and QEMU may wait with it for ever.
+    /// Send QEMU `quit`: the machine is off, and QEMU may otherwise wait for ever.
     Quit,
-    /// Ask QEMU by `query-status` why the machine has stopped.
+    /// Send QEMU `query-status` to find out why the machine has stopped.
     AskStatus,
     /// Take the last screendump and acknowledge the kernel's report.
     Acknowledge,
 }
 
-/// What is known of a run.
+/// The state of a run.
 #[derive(Debug, Default)]
 pub struct Run {
     /// The kernel's first line has come.
     pub hello: bool,
-    /// What the kernel said of its ramdisk's pack.
+    /// The kernel's line about the model file in its ramdisk: accepted or refused.
     pub pack: Option<String>,
     /// The user's arguments ask QEMU for a list (`-d help`).
     pub asked_for_list: bool,
     /// The machine has been started.
     pub started: bool,
-    /// The kernel was asked to leave.
+    /// The kernel was sent `leave`.
     pub leaving: bool,
-    /// Since when a user has had the machine paused.
+    /// When the user paused the machine, if it is paused.
     pub paused: Option<Instant>,
-    /// The kernel's lines that nobody has read yet.
+    /// The kernel's unread lines.
     pub lines: VecDeque<String>,
-    /// QEMU's replies that nobody has read yet.
+    /// QEMU's unread replies.
     pub replies: VecDeque<Value>,
-    /// QEMU's own words.
+    /// QEMU's output, and explanations from its events.
     pub words: Vec<String>,
-    /// QEMU's end.
+    /// QEMU's exit status, once it has ended.
     pub ended: Option<ExitStatus>,
-    /// Why QEMU says that the machine was turned off: the first reason, since `quit` is followed
-    /// by a reason of its own.
+    /// QEMU's reason for turning the machine off. The first reason stays, because `quit` adds another reason
+    /// later.
     shutdown: Option<String>,
-    /// The machine was reset and goes on.
+    /// The machine was reset and continues.
     reset: bool,
     /// The lines of the kernel's report.
     report: Vec<String>,
     serial_closed: bool,
     control_closed: bool,
-    /// A verdict that does not wait for QEMU's end.
+    /// A verdict that does not need to wait for QEMU's end.
     certain: Option<Verdict>,
 }
 
 impl Run {
-    /// Takes in an event.
+    /// Updates the state with an event, and returns the action that follows from it.
     pub fn take(&mut self, event: Event) -> Option<Act> {
         match event {
             Event::Line(line) => return self.take_line(line),
@@ -130,7 +130,7 @@ impl Run {
 
     fn take_control(&mut self, message: Value) -> Option<Act> {
         let Some(event) = message.get("event").and_then(Value::as_str) else {
-            // The greeting has no id, and neither has anything that was not asked for.
+            // QMP's greeting and its events have no `id`; only replies have one.
             if message.get("id").is_some() {
                 self.take_status(&message["return"]["status"]);
                 self.replies.push_back(message);
@@ -145,16 +145,17 @@ impl Run {
                 }
                 let reason = message["data"]["reason"].as_str().unwrap_or("unknown");
                 self.shutdown = Some(reason.to_string());
-                // `-no-shutdown` makes a machine stand still that is off. For some reasons QEMU
-                // ends in spite of that, as 7.2 does for `isa-debug-exit`; of 10 and later `quit`
-                // brings the exit code that the kernel wrote to that device. A machine that has
-                // reset itself is judged while it stands.
+                // With `-no-shutdown` QEMU keeps running when the machine is off, so it needs `quit`. For
+                // some reasons QEMU ends despite the option, as 7.2 does for `isa-debug-exit`. From version
+                // 10 on, `quit` yields the exit code that the kernel wrote to that device. A machine that has
+                // reset itself gets no `quit`: it is judged while it stands still.
                 return (reason != "guest-reset").then_some(Act::Quit);
             }
-            // A user's request, at the window's menu or the monitor, that the kernel does not hear.
+            // The user asked for a power-down in the window's menu or at the monitor. The kernel does not
+            // notice it.
             "POWERDOWN" => return Some(Act::Quit),
             "RESET" => self.reset = true,
-            // A machine that is off has stopped, too: nobody has paused it.
+            // A machine that is off sends `STOP` too, but no user has paused it.
             "STOP" if self.shutdown.is_none() => {
                 self.paused.get_or_insert_with(Instant::now);
                 return Some(Act::AskStatus);
@@ -168,7 +169,7 @@ impl Run {
         None
     }
 
-    /// Takes in the machine's run state, by QEMU's name for it.
+    /// Updates the state with the machine's run state, given by QEMU's name for it.
     fn take_status(&mut self, status: &Value) {
         match status.as_str() {
             Some("running") => self.paused = None,
@@ -184,33 +185,33 @@ impl Run {
         }
     }
 
-    /// The first verdict that is certain stays.
+    /// Keeps the verdict, unless an earlier one is certain already.
     fn decide(&mut self, verdict: Verdict) {
         self.certain.get_or_insert(verdict);
     }
 
-    /// The machine was reset, and may be going on.
+    /// Returns whether the machine was reset. It may be running again.
     pub fn was_reset(&self) -> bool {
         self.reset || self.shutdown.as_deref() == Some("guest-reset")
     }
 
-    /// Returns whether the verdict is certain. When QEMU has ended, the last words of the kernel and of QEMU
-    /// may still be on their way.
+    /// Returns whether the verdict is certain. QEMU's end alone is not enough: the last words of the kernel
+    /// and of QEMU may still be unread.
     pub fn is_decided(&self) -> bool {
         self.certain.is_some()
             || self.shutdown.as_deref() == Some("guest-reset")
             || (self.ended.is_some() && self.serial_closed && self.control_closed)
     }
 
-    /// What QEMU printed, if that was all it was asked for (`-machine help`): it ended well before
-    /// it started the machine. QEMU 7.2 ends `-d help` with 1.
+    /// Returns QEMU's output if its arguments asked only for a list (`-machine help`): QEMU ended
+    /// successfully before the machine was started. QEMU 7.2 ends `-d help` with exit code 1.
     pub fn printed(&self) -> Option<String> {
         let code = self.ended.and_then(|status| status.code());
         let well = code == Some(0) || (code == Some(1) && self.asked_for_list);
         (well && !self.started && !self.words.is_empty()).then(|| self.words.join("\n") + "\n")
     }
 
-    /// The verdict; `Ok` when the kernel left because it was asked to.
+    /// Returns `Ok` if the kernel left on command, and otherwise the verdict.
     pub fn verdict(&mut self) -> Result<(), Verdict> {
         if let Some(verdict) = self.certain.take() {
             return Err(verdict);
@@ -228,8 +229,9 @@ impl Run {
                 reset: true,
                 found: Found::default(),
             },
-            // SDL's window says host-ui when it is closed. GTK's quits as QMP would, and so does
-            // this program, but only after a user's request or another reason.
+            // SDL's window gives the reason `host-ui` when it is closed. GTK's window gives `host-qmp-quit`.
+            // So does this program's `quit`, but only after the user's request or an earlier reason, which
+            // stays.
             (_, Some("host-ui" | "host-qmp-quit" | "host-qmp-system-reset" | "host-signal")) => {
                 Verdict::User
             }
@@ -240,7 +242,7 @@ impl Run {
         })
     }
 
-    /// The exit that a whole report announces, should QEMU's exit code not tell.
+    /// Returns the exit that a complete report announces, in case QEMU's exit code does not show it.
     fn reported(&self) -> Option<Exit> {
         let first = self.report.first()?.split(' ').next()?;
         let ends = [
@@ -260,7 +262,7 @@ mod tests {
     use super::*;
 
     const HELLO: &str = "com1 hello crystal-ball 0.1.0 protocol ";
-    /// Recorded messages, without their time stamps, which nothing reads.
+    /// Recorded messages, without their time stamps, which no code reads.
     const GUEST_SHUTDOWN: &str =
         r#"qmp {"event": "SHUTDOWN", "data": {"guest": true, "reason": "guest-shutdown"}}"#;
     const GUEST_RESET: &str =
@@ -275,7 +277,7 @@ mod tests {
     const STOP: &str = r#"qmp {"event": "STOP"}"#;
     const RESUME: &str = r#"qmp {"event": "RESUME"}"#;
 
-    /// A run that the events have been played to, and what they asked for.
+    /// Returns a run that has received `events`, and the actions that followed.
     fn played(events: &[&str]) -> (Run, Vec<Act>) {
         let (mut run, mut acts) = (Run::default(), Vec::new());
         run.started = true;
@@ -290,7 +292,7 @@ mod tests {
                     run.take(Event::SerialClosed);
                     run.take(Event::ControlClosed);
                     let number: i32 = rest.parse().unwrap();
-                    // The wait status: a negative number is a signal's.
+                    // The wait status: a negative number stands for a signal.
                     let status = if number < 0 { -number } else { number << 8 };
                     Event::Ended(Ok(ExitStatus::from_raw(status)))
                 }
@@ -319,7 +321,7 @@ mod tests {
             assert!(run.is_decided());
             run.leaving = true;
             assert_eq!(run.verdict(), Ok(()));
-            // One that was not asked to leave is no success.
+            // A kernel that leaves without the command is a failure.
             let (mut run, _) = played(events);
             assert_eq!(run.verdict().unwrap_err().exit_code(), 15);
         }
@@ -377,10 +379,11 @@ mod tests {
         for (events, quits) in [
             (&[HELLO, QUIT, "end 0"][..], true),
             (&[HELLO, SIGNAL, "end 0"], true),
-            // Reset in the window's menu: `-no-reboot` makes it a shutdown that stands still.
+            // Reset in the window's menu: `-no-reboot` turns it into a shutdown, and the machine stands
+            // still.
             (&[HELLO, SYSTEM_RESET, STOP, QUIT, "end 0"], true),
             (&[HELLO, POWERDOWN, QUIT, "end 0"], true),
-            // Closed while it was paused.
+            // The window was closed during a pause.
             (&[HELLO, STOP, QUIT, "end 0"], true),
         ] {
             let (mut run, acts) = played(events);
@@ -390,7 +393,7 @@ mod tests {
         }
     }
 
-    /// QEMU's last message may be read after its end is known: the reason of a shutdown is in it.
+    /// QEMU's last message may be read after its end is known, and it contains the reason of a shutdown.
     #[test]
     fn the_last_message_is_waited_for() {
         let (mut run, _) = played(&[HELLO, POWERDOWN]);
@@ -418,7 +421,7 @@ mod tests {
         assert!(run.paused.is_none());
         let (run, _) = played(&[HELLO, STOP, RESUME]);
         assert!(run.paused.is_none());
-        // A machine that is off, whichever of the two events comes first.
+        // A machine that is off is not paused, whichever of the two events comes first.
         for events in [[HELLO, GUEST_SHUTDOWN, STOP], [HELLO, STOP, GUEST_SHUTDOWN]] {
             let (run, acts) = played(&events);
             assert!(run.paused.is_none() && run.shutdown.is_some(), "{events:?}");

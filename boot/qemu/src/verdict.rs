@@ -1,4 +1,4 @@
-//! How a run ended, in words and as an exit code.
+//! The verdict on a run: its message, its exit code and its evidence.
 
 use std::ffi::OsString;
 use std::fmt;
@@ -11,68 +11,69 @@ use std::time::SystemTime;
 use super::command::{names_accelerator, option};
 use frames::screen::Screen;
 
-/// The memory that the image boots with on every QEMU tried: 7.2 needs 25 MiB, 10 and later up to
-/// 32.
+/// MiB of memory with which the image boots on every QEMU version tried: 7.2 needs 25, versions from 10 on up
+/// to 32.
 const ENOUGH_MIB: u64 = 32;
-/// Options that put other firmware or another system in the image's place.
+/// QEMU options that may replace the image by other firmware or another system.
 const OTHER_FIRMWARE: [&str; 6] = ["bios", "boot", "kernel", "L", "option-rom", "pflash"];
 
-/// Failures whose evidence is kept; older ones are removed.
+/// Number of failures whose evidence is kept; older evidence is removed.
 const KEPT: usize = 20;
 
-/// How a run ended, other than well.
+/// How a run ended, unless the kernel left on command.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The user closed the window, or ended QEMU by a signal.
+    /// The user closed the window, reset or powered down the machine from QEMU's menu, or ended QEMU by a
+    /// signal.
     User,
     /// The kernel panicked.
     Panic {
-        /// Its last words.
+        /// The kernel's report.
         report: Vec<String>,
     },
     /// The CPU raised an exception in the kernel.
     Exception {
-        /// The kernel's last words.
+        /// The kernel's report.
         report: Vec<String>,
     },
-    /// The display adapter does not take Mode X.
+    /// The display adapter does not support Mode X.
     Adapter {
-        /// The kernel's last words.
+        /// The kernel's report.
         report: Vec<String>,
     },
-    /// The machine reset itself with the kernel running.
+    /// The machine reset itself while the kernel was running.
     TripleFault {
-        /// Whether it was seen to boot again, and not only to reset.
+        /// Whether the kernel was seen to start a second time; otherwise only the reset was seen.
         booted: bool,
     },
-    /// The kernel said nothing for too long.
+    /// Something that this program waited for did not come in time.
     Hang {
-        /// What did not come.
+        /// What did not come, as a noun phrase.
         waited_for: String,
     },
-    /// The kernel was never reached.
+    /// The boot loader ended before it reached the kernel.
     BootLoader {
-        /// The machine reset; otherwise nothing happened at all.
+        /// Whether the machine reset; otherwise nothing happened at all.
         reset: bool,
-        /// What the machine is like.
+        /// QEMU's answers about the machine.
         found: Found,
     },
-    /// The serial line brought something that is not the kernel's.
+    /// The serial line carried data that the kernel of this version does not send.
     Garbled {
-        /// What is wrong with it.
+        /// What is wrong with the data.
         why: String,
     },
     /// QEMU itself failed.
     Qemu {
-        /// What it said.
+        /// QEMU's output.
         words: Vec<String>,
-        /// How it ended.
+        /// QEMU's exit status, if it had ended.
         status: Option<ExitStatus>,
     },
 }
 
 impl Verdict {
-    /// The exit code of this program for the verdict.
+    /// Returns this program's exit code for the verdict.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Panic { .. } => 10,
@@ -83,7 +84,7 @@ impl Verdict {
             Self::Qemu { .. } => 15,
             Self::Garbled { .. } => 16,
             Self::Adapter { .. } => 17,
-            // As a shell reports Ctrl-C.
+            // The exit code that a shell reports for Ctrl-C.
             Self::User => 130,
         }
     }
@@ -131,21 +132,21 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// What a machine is like whose boot loader did not reach the kernel.
+/// The properties of a machine whose boot loader did not reach the kernel.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Found {
-    /// Bytes of memory, if QEMU said.
+    /// Bytes of memory, if QEMU reported them.
     pub memory: Option<u64>,
-    /// Whether the CPU has long mode, if QEMU said.
+    /// Whether the CPU has long mode, if QEMU reported it.
     pub long_mode: Option<bool>,
     /// The user's arguments for QEMU.
     pub arguments: Vec<OsString>,
-    /// The lines on a screen in text mode.
+    /// The lines on the screen, if it is in text mode.
     pub screen: Vec<String>,
 }
 
 impl Found {
-    /// What the image cannot boot with, and what to do about it.
+    /// Returns the reasons why the image may not boot on this machine, each with its remedy.
     fn causes(&self) -> Vec<String> {
         let mut causes = Vec::new();
         if let Some(bytes) = self.memory
@@ -206,8 +207,10 @@ impl fmt::Display for Found {
     }
 }
 
-/// The lines that VGA text memory shows: a character and its colours for each place, 80 in a line.
-/// Nothing, if that is no text: the memory may hold something else.
+/// Returns the non-empty lines in VGA text memory: two bytes for each place, the character and its colours,
+/// and 80 places in a line.
+///
+/// Returns no lines if a character is not printable ASCII or zero: the memory then holds something else.
 pub fn text_lines(memory: &[u8]) -> Vec<String> {
     let characters = memory.iter().step_by(2);
     let is_text = |byte: u8| byte == 0 || (b' '..=b'~').contains(&byte);
@@ -220,7 +223,7 @@ pub fn text_lines(memory: &[u8]) -> Vec<String> {
     lines.filter(|line| !line.is_empty()).collect()
 }
 
-/// What to make of QEMU's words.
+/// Returns an explanation of QEMU's output, if the output is a known error.
 fn explain(words: &[String]) -> Option<&'static str> {
     let said = |text: &str| words.iter().any(|line| line.contains(text));
     if said("Failed to get") && said("lock") {
@@ -236,7 +239,7 @@ fn explain(words: &[String]) -> Option<&'static str> {
     }
 }
 
-/// Lines below a message.
+/// Lines below a message, indented.
 struct Indented<'a>(&'a [String]);
 
 impl fmt::Display for Indented<'_> {
@@ -245,7 +248,7 @@ impl fmt::Display for Indented<'_> {
     }
 }
 
-/// What is kept of a run that failed.
+/// The evidence of a run, in case it fails.
 #[derive(Debug)]
 pub(super) struct Evidence {
     /// QEMU's command line.
@@ -257,7 +260,7 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Writes the evidence into a folder of its own under `failures`, and returns that folder.
+    /// Writes the evidence into a new folder under `failures`, and returns that folder.
     fn keep(&self, failures: &Path) -> anyhow::Result<PathBuf> {
         std::fs::create_dir_all(failures)?;
         forget_oldest(failures);
@@ -269,7 +272,7 @@ impl Evidence {
             .keep();
         std::fs::write(folder.join("command.txt"), &self.command)?;
         if let Some(log) = &self.serial {
-            // By place: its writer shares the file's position.
+            // Read from an explicit offset: the log's writer shares the file's position.
             let mut bytes = vec![0; log.metadata()?.len().try_into()?];
             log.read_exact_at(&mut bytes, 0)?;
             std::fs::write(folder.join("serial.log"), bytes)?;
@@ -286,8 +289,8 @@ impl Evidence {
 pub struct Failure {
     /// How the run ended.
     pub verdict: Verdict,
-    /// The folder with QEMU's command line (`command.txt`), the serial log (`serial.log`) and a
-    /// last screendump (`screen.png`, if QEMU could still take one).
+    /// The folder with QEMU's command line (`command.txt`), the serial log (`serial.log`) and a last
+    /// screendump (`screen.png`, if QEMU could still take one).
     pub evidence: Option<PathBuf>,
 }
 
@@ -299,23 +302,24 @@ impl Failure {
         }
     }
 
-    /// Keeps the evidence in a folder under `failures`.
+    /// Keeps the evidence in a folder under `failures`, and returns the failure.
     pub(super) fn keep(verdict: Verdict, evidence: &Evidence, failures: &Path) -> Self {
-        // Evidence that cannot be kept must not hide the failure that it is about.
+        // If the evidence cannot be kept, the failure itself must still be reported.
         let evidence = evidence.keep(failures).ok();
         Self { verdict, evidence }
     }
 }
 
-/// Makes room for one more: the evidence of failures long mended should not fill a disk.
+/// Removes the oldest evidence, to make room for one more folder. Evidence of old failures must not fill the
+/// disk.
 fn forget_oldest(failures: &Path) {
     let entries = read_dir(failures).into_iter().flatten();
     let mut kept: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
-    // Their names begin with the time.
+    // The folders' names begin with the time.
     kept.sort();
     let spare = kept.len().saturating_sub(KEPT - 1);
     for folder in &kept[..spare] {
-        // Another run may be removing it, too.
+        // Another run may be removing the same folder.
         let _ = std::fs::remove_dir_all(folder);
     }
 }

@@ -1,38 +1,38 @@
-//! How long is too long, on a machine that may be busy with other things.
+//! Decides when a wait has lasted too long, on a machine that may be busy with other work.
 //!
-//! A limit in wall time is wrong twice: beside other work a sound boot can take ten times its
-//! usual time, and a limit wide enough for that makes every real hang wait for it. QEMU's own
-//! processor time tells the two apart. A kernel that spins uses it up; one that has stopped, or
-//! never came, uses next to none of it; and one that only has to share the processor uses what
-//! it gets, and waits for the rest: Linux counts that wait, too, so a QEMU that is starved is not
-//! taken for one that idles.
+//! A limit in wall time fails in two ways. Beside other work a sound boot can need ten times its usual time,
+//! and a limit wide enough for that delays the report of every real hang. QEMU's processor time distinguishes
+//! three cases. A kernel that spins uses up its limit. A kernel that has stopped, or never started, uses
+//! almost no processor time. A kernel that shares the processor uses what it gets and waits for the rest.
+//! Linux counts that waiting time as well, so a starved QEMU is not mistaken for an idle QEMU.
 
 use std::time::{Duration, Instant};
 
 use rustix::process::Pid;
 
-/// Looks at whether QEMU idles within a limit: each look is long enough to tell.
+/// Checks for idleness per limit. The interval between two checks must be long enough to measure.
 const LOOKS: u32 = 2;
-/// Idle: less than this of one processor, used or waited for. A stopped machine was seen to use
-/// 1.3 % (its timers). One that boots beside thirty busy processes on two cores used less than 4 %
-/// for 10 s: its threads wait for each other at every sector.
+/// QEMU is idle if it uses or waits for less than this share of one processor. A stopped machine used 1.3 %
+/// (its timers). Processor time alone does not suffice: beside thirty busy processes on two cores a booting
+/// machine used less than 4 % for 10 s, because its threads wait for each other at every sector.
 const IDLE_PERCENT: u32 = 4;
-/// Wall time beyond which nothing is waited for, in limits.
+/// Ceiling of every wait: this many limits of wall time.
 const AT_MOST: u32 = 15;
 
-/// Waiting for one thing.
+/// A wait for one thing, with its limit.
 #[derive(Debug)]
 pub struct Watchdog {
     process: Pid,
     limit: Duration,
     began: Instant,
     used: Duration,
-    /// The last look at whether QEMU idles, and the time used or waited for until then.
+    /// When idleness was last checked, and the total time used or waited for until then.
     looked: (Instant, Duration),
 }
 
 impl Watchdog {
-    /// Waits until QEMU has worked for `limit`, or has idled when `limit` has passed.
+    /// Starts a wait that is over when QEMU has used `limit` of processor time, or is idle after `limit` of
+    /// wall time.
     pub fn new(process: Pid, limit: Duration) -> Self {
         let (now, used) = (Instant::now(), processor_time(process));
         Self {
@@ -44,19 +44,20 @@ impl Watchdog {
         }
     }
 
-    /// Begins anew.
+    /// Starts the wait again, from now.
     pub fn renew(&mut self) {
         *self = Self::new(self.process, self.limit);
     }
 
-    /// Whether it is over by the clock, whatever QEMU does meanwhile.
+    /// Returns whether the wall time has reached the ceiling, whatever QEMU does meanwhile.
     pub fn is_past_ceiling(&self) -> bool {
         self.began.elapsed() >= self.limit * AT_MOST
     }
 
-    /// Whether it is over.
+    /// Returns whether the wait is over.
     pub fn is_over(&mut self) -> bool {
-        // A process that has just ended has used less than before: none.
+        // For a process that has just ended this is zero, less than before: hence the saturating
+        // subtractions.
         let (now, used) = (Instant::now(), processor_time(self.process));
         let (since, before) = self.looked;
         let mut idle = false;
@@ -72,11 +73,11 @@ impl Watchdog {
     }
 }
 
-/// The processor time that a process has used; for one that has ended, and where the system does
-/// not tell (only Linux does, in this way), none: then wall time decides.
+/// Returns the processor time that a process has used. It is zero for a process that has ended, and on any
+/// system but Linux, which alone reports it in this way: then wall time decides.
 fn processor_time(process: Pid) -> Duration {
     let told = std::fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero()));
-    // The second field is the program's name, in parentheses, with anything in it.
+    // The second field is the program's name in parentheses, and the name may contain any character.
     let fields = told.as_deref().ok().and_then(|stat| stat.rsplit_once(')'));
     let mut fields = fields
         .map_or("", |(_, fields)| fields)
@@ -87,8 +88,8 @@ fn processor_time(process: Pid) -> Duration {
     Duration::from_millis(all * 1000 / rustix::param::clock_ticks_per_second().max(1))
 }
 
-/// Returns how long the threads of a process were ready to run and had no processor; zero if the system
-/// does not count it.
+/// Returns how long the threads of a process were ready to run and had no processor; zero if the system does
+/// not count it.
 pub fn starved_time(process: Pid) -> Duration {
     let tasks = std::fs::read_dir(format!("/proc/{}/task", process.as_raw_nonzero()));
     let delays = tasks.into_iter().flatten().flatten().filter_map(|task| {
@@ -102,7 +103,7 @@ pub fn starved_time(process: Pid) -> Duration {
 mod tests {
     use super::*;
 
-    /// Two busy threads for each processor: all of them wait.
+    /// Two busy threads for each processor: all of them have to wait.
     #[test]
     fn a_starved_process_is_seen_to_wait() {
         let own = rustix::process::getpid();
@@ -119,7 +120,7 @@ mod tests {
                     })
                 })
                 .collect();
-            // While they live: a thread that has ended is not counted.
+            // Only while the threads live: a thread that has ended is not counted.
             while busy.iter().all(|thread| !thread.is_finished()) {
                 if starved_time(own) - before > Duration::from_millis(50) {
                     return;
