@@ -1,10 +1,10 @@
-//! QEMU's window, made large enough to see something in it.
+//! Enlarges QEMU's window.
 //!
-//! QEMU opens its window as large as the card's picture, 640 x 480, and has no option for another
-//! size. So it is asked to scale what it shows (GTK does so if told to, SDL always), and the window
-//! is enlarged from here, as a pager or a window manager would do it. That is X11's protocol. A
-//! Wayland compositor lets no program do it to another's window: there it opens as before, and its
-//! user enlarges it.
+//! QEMU opens its window at the size of the VGA's image, 640 x 480, and has no option for another size. So
+//! QEMU is set to scale its display (GTK has an option for that, SDL always scales), and this module
+//! enlarges the window, as a pager or a window manager would. It uses X11's protocol. A Wayland compositor
+//! lets no program resize another program's window: there the window opens as before, and the user enlarges
+//! it.
 
 use x11rb::connection::Connection;
 use x11rb::protocol::randr::ConnectionExt as _;
@@ -20,16 +20,16 @@ struct Area {
     height: u32,
 }
 
-/// The most of a monitor's width and height that the picture gets, in fifths: title bars and panels
-/// need their share.
+/// The largest part of a monitor's width and height that the frame gets, in fifths: title bars and panels
+/// need the rest.
 const FIFTHS: u32 = 4;
-/// Mode X's picture: a whole multiple of it shows all pixels equally large.
+/// The size of Mode X's frame. A whole multiple of it shows all pixels equally large.
 const PICTURE: (u32, u32) = (320, 240);
 
-/// Enlarges the window of QEMU's process, if it is there and as small as QEMU made it.
+/// Enlarges the window of QEMU's process, if the window exists and has the size that QEMU gave it.
 ///
 /// # Errors
-/// There is no X server, or it does not do as it is asked. The window is as it was.
+/// If there is no X server, or it refuses a request. The window keeps its size.
 pub fn enlarge(process: u32) -> anyhow::Result<()> {
     let (x, screen) = x11rb::connect(None)?;
     let root = x.setup().roots[screen].root;
@@ -81,7 +81,8 @@ impl Area {
     }
 }
 
-/// The window that the process shows: with a window manager one of its list, else one of the root's.
+/// Returns the visible window of the process. It searches the window manager's list, or, without a window
+/// manager, the root's children.
 fn find(x: &RustConnection, root: Window, process: u32) -> anyhow::Result<Option<Window>> {
     let atom = |name: &str| anyhow::Ok(x.intern_atom(false, name.as_bytes())?.reply()?.atom);
     let numbers = |window, name: &str, of| {
@@ -99,17 +100,17 @@ fn find(x: &RustConnection, root: Window, process: u32) -> anyhow::Result<Option
         let of = numbers(window, "_NET_WM_PID", AtomEnum::CARDINAL)?;
         anyhow::Ok(state == MapState::VIEWABLE && of.is_some_and(|of| of == [process]))
     };
-    // One that is gone by now is an error, and not ours.
+    // A window that has closed since it was listed gives an error, and is not QEMU's.
     Ok(all
         .into_iter()
         .find(|&window| is_shown(window).unwrap_or(false)))
 }
 
-/// The window in the monitor's middle, as large as is fit; none if it is that large, or if it is
-/// not of the size that QEMU gives it: somebody else has chosen that.
+/// Returns the largest suitable rectangle in the monitor's middle. Returns `None` if the window is already
+/// as large as that, or does not have a size that QEMU gives it, because then somebody else chose the size.
 fn enlarged(window: Area, monitor: Area) -> Option<Area> {
     let (width, height) = PICTURE;
-    // What stands above the picture: GTK's menus.
+    // The height above the frame: GTK's menus.
     let above = window.height.checked_sub(window.width / width * height)?;
     if !window.width.is_multiple_of(width) || above > window.height / 8 {
         return None;
@@ -144,7 +145,7 @@ mod tests {
         let gtk = area(10, 10, 640, 505);
         for (monitor, large) in [
             (area(0, 0, 1920, 1080), Some(area(480, 168, 960, 745))),
-            // The second of two monitors, one of them turned upright.
+            // The second of two monitors, once upright and once to the left.
             (area(1920, 0, 1080, 1920), None),
             (
                 area(-2560, 0, 2560, 1440),
@@ -159,12 +160,12 @@ mod tests {
         let sdl = area(0, 0, 640, 480);
         let full_hd = area(0, 0, 1920, 1080);
         assert_eq!(enlarged(sdl, full_hd), Some(area(480, 180, 960, 720)));
-        // On a desktop of scale 2 GTK's window is twice as large, menus and all.
+        // On a desktop of scale 2, GTK's window is twice as large, including its menus.
         let scaled = area(0, 0, 1280, 1010);
         assert_eq!(enlarged(scaled, full_hd), None);
         let at_4k = enlarged(scaled, area(0, 0, 3840, 2160));
         assert_eq!(at_4k, Some(area(800, 215, 2240, 1730)));
-        // Tiled, or maximised.
+        // A tiled, a maximised and a resized window.
         for chosen in [
             area(0, 0, 960, 1080),
             area(0, 0, 1920, 1080),

@@ -1,15 +1,15 @@
 //! A model's palette, light table and texels.
 //!
-//! Two reductions, each by a quantizer that works in a space of even steps to the eye (Oklab). The
-//! texture is reduced to `MATERIALS` colours. Then each of these is lit in all levels, from night
-//! to glint, as the built-in ramps are; and what that gives is reduced to the part of the palette
-//! that background, writing and the split view's heat map leave free. The light table takes each
-//! material at each level to the nearest entry of the whole palette.
+//! There are two reductions, each by a quantizer that works in Oklab, a colour space in which equal steps
+//! look equal. The first reduces the texture to `MATERIALS` colours. Each of these colours is then lit at
+//! all levels, from night to glint, as the built-in ramps are. The second reduces the lit colours to the
+//! part of the palette that the background, the overlay's text and the split view's heat map leave free. The
+//! light table maps each material at each level to the nearest entry of the whole palette.
 //!
-//! Where the palette has no colour near enough, a surface would fall into bands. So a texel has not
-//! its material alone: by its place in a square of two by two it is one of `VARIANTS`, and for
-//! each level the entries of the four are chosen one after the other, each to make good for what the
-//! ones before it were off. Together they have the colour that was meant.
+//! Where the palette has no colour near enough, a surface would fall into bands. So a texel holds more than
+//! its material: by its place in a square of two by two, it is one of `VARIANTS` variants. For each level,
+//! the entries of the four variants are chosen in turn, and each choice corrects the error of the choices
+//! before it. Together the four have the intended colour.
 
 use std::collections::BTreeSet;
 
@@ -23,38 +23,39 @@ use scene::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable};
 use show::HEAT;
 use vga::widen;
 
-/// Texels of one material: two by two.
+/// The number of variants of a material: one for each texel of a square of two by two.
 const VARIANTS: usize = 4;
-/// Colours of the texture.
+/// The number of colours of the texture.
 const MATERIALS: usize = 256 / VARIANTS;
-/// Which of the variants a texel is, by whether its column is odd, and its row: what is brightest
-/// and what is darkest lie on a diagonal.
+/// The variant of a texel, by whether its row is odd and whether its column is odd. The two darker variants
+/// lie on one diagonal, the two brighter on the other.
 const PATTERN: [[usize; 2]; 2] = [[0, 2], [3, 1]];
-/// What the built-in ramps begin in, widened: what is turned from the lamp is lit by the night sky.
+/// The first colour of the built-in ramps, with 8 bits a component: the night sky lights surfaces that face
+/// away from the lamp.
 const NIGHT: [f64; 3] = [8.0, 5.0, 28.0];
-/// The lamp's own colour, which a highlight goes to.
+/// The lamp's colour, which a highlight approaches.
 const LAMP: [f64; 3] = [255.0, 253.0, 244.0];
-/// The way to the lamp's colour that the brightest highlight goes.
+/// The part of the way to the lamp's colour that the brightest highlight goes.
 const GLINT: f64 = 0.4;
 
-/// The part of an error that is made good for. With all of it a small one would add up until one
-/// texel of the four has another hue altogether, which is seen more than the error.
+/// The part of the error that the next variant corrects. With a part of 1, a small error would add up until
+/// one texel of the four has a different hue, which is more visible than the error.
 const MADE_GOOD: f32 = 0.6;
-/// How much more the most frequent material weighs than one that hardly occurs.
+/// The additional weight of the most frequent material, compared with a material that hardly occurs.
 const MOST_WEIGHT: f64 = 32.0;
 
-/// What a texture is reduced to.
+/// A reduced texture.
 #[derive(Clone, Debug)]
 pub struct Reduced {
-    /// Which material and which variant, row by row.
+    /// The material and the variant of each texel, row by row.
     pub texels: Vec<u8>,
     /// The DAC's colours.
     pub palette: Palette,
-    /// The entry of each texel's value at each level.
+    /// For each light level, the palette entry of each texel value.
     pub light: LightTable,
 }
 
-/// Reduces a texture of so many columns.
+/// Reduces a texture with this number of columns.
 pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
     let colours: Vec<_> = texture
         .iter()
@@ -114,8 +115,8 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
     }
 }
 
-/// The lit colours, those more often of which there is more, by the square root: a large field is
-/// smooth then, and an eye in it still has its colour.
+/// Returns the lit colours, each repeated by the square root of its frequency. So a large area is smooth,
+/// and a small detail, such as an eye in it, keeps its colour.
 fn weighted(lit: &[Vec<Srgb<u8>>], used: &[u32]) -> Vec<Srgb<u8>> {
     let most = used.iter().copied().max().unwrap_or(1);
     let times = |used: u32| 1 + (MOST_WEIGHT * (f64::from(used) / f64::from(most)).sqrt()) as usize;
@@ -128,7 +129,8 @@ fn weighted(lit: &[Vec<Srgb<u8>>], used: &[u32]) -> Vec<Srgb<u8>> {
     weighted
 }
 
-/// At most `count` colours for all of these: they themselves, if there are no more.
+/// Returns at most `count` colours that represent the given colours: the colours themselves, if there are no
+/// more than `count`.
 fn quantized(colours: &[Srgb<u8>], count: usize) -> Vec<Srgb<u8>> {
     let parts = colours.iter().map(|&colour| <[u8; 3]>::from(colour));
     let different: BTreeSet<_> = parts.collect();
@@ -145,7 +147,7 @@ fn quantized(colours: &[Srgb<u8>], count: usize) -> Vec<Srgb<u8>> {
     input.output_srgb8_palette().into_vec()
 }
 
-/// A colour in the light of a level, in steps that look even, as the ramps are.
+/// Returns a colour at a light level. The steps between levels look even, as in the built-in ramps.
 fn lit(colour: Srgb<u8>, level: usize) -> Srgb<u8> {
     let full = (FULL_LIGHT + AMBIENT) as f64;
     let diffuse = (level.min(FULL_LIGHT) + AMBIENT) as f64 / full;
@@ -159,12 +161,12 @@ fn lit(colour: Srgb<u8>, level: usize) -> Srgb<u8> {
     }))
 }
 
-/// Eight bits of each part as the DAC's six, rounded.
+/// Rounds a colour from 8 bits a component to the DAC's 6.
 fn narrow(colour: Srgb<u8>) -> Rgb6 {
     [colour.red, colour.green, colour.blue].map(|part| ((u16::from(part) * 63 + 127) / 255) as u8)
 }
 
-/// Looks colours up.
+/// Finds the nearest of some colours.
 struct Nearest {
     colours: Vec<Oklab>,
 }
@@ -174,7 +176,7 @@ impl Nearest {
         Self { colours }
     }
 
-    /// The number of the nearest one; of several the first.
+    /// Returns the index of the nearest colour, or the first index if several are equally near.
     fn to(&self, colour: Oklab) -> usize {
         let distance = |other: &Oklab| {
             let off = *other - colour;
@@ -190,7 +192,7 @@ impl Nearest {
 mod tests {
     use super::*;
 
-    /// A texture of 64 x 64 with a sweep of hues, a flat field and one odd texel.
+    /// Returns a texture of 64 x 64 with a range of hues, a flat area and one odd texel.
     fn texture() -> Vec<Rgb<u8>> {
         let mut texture: Vec<_> = (0..64 * 64u32)
             .map(|i| match (i % 64, i / 64) {
@@ -225,7 +227,8 @@ mod tests {
                 }
             }
         }
-        // As seen by the eye; a channel alone may be off by more.
+        // The bounds are wide, because the error is small as the eye sees it, and a single channel can be
+        // further off.
         let mean = sum / (3 * 32 * 32);
         assert!(mean < 12 && worst < 96, "{mean}, at most {worst}, of 255");
         let black = shown(30, 50);

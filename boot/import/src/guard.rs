@@ -1,8 +1,8 @@
-//! Work on foreign files, fenced in.
+//! Protection against files that take for ever to read, or make a library panic.
 //!
-//! Files may be made to take for ever, or to make a library panic. So the work is done on a thread
-//! that nobody has to wait for, whatever it is doing: reading a pipe that never ends, cutting a face,
-//! decoding, quantising. The thread that asked for it hears of interrupts and looks at the clock.
+//! The work is done on a separate thread, and nobody has to wait for it, whatever it is doing: reading an
+//! endless pipe, cutting a face, decoding, quantising. The calling thread waits for the result, and watches
+//! for interrupts and for the time limit.
 
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
@@ -11,17 +11,17 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, bail};
 use system::{Interrupted, interrupted};
 
-/// How often the waiting thread looks up.
+/// The interval at which the waiting thread checks for interrupts and for the time limit.
 const LOOK_UP: Duration = Duration::from_millis(20);
-/// The work's stack: as large as that of a program's first thread.
+/// The size of the worker's stack: that of a program's first thread.
 const STACK: usize = 8 << 20;
 
-/// Does `work` on the file of this name, for `limit` at most, and returns its result.
+/// Runs `work` on the file with this name, for at most `limit`, and returns its result.
 ///
-/// The thread of work that is given up goes on until the program ends: the caller should end it.
+/// After an error, the worker's thread may run until the program ends, so the caller should end the program.
 ///
 /// # Errors
-/// Those of the work; [`Interrupted`] when the user asks to stop; the time limit; a panic.
+/// Those of the work; [`Interrupted`] if the user stops the program; the time limit; a panic.
 pub fn run<T: Send + 'static>(
     name: &str,
     limit: Duration,
@@ -29,7 +29,7 @@ pub fn run<T: Send + 'static>(
 ) -> anyhow::Result<T> {
     let (send, done) = channel();
     let worker = thread::Builder::new().stack_size(STACK).spawn(move || {
-        // Where nobody listens any more, nobody misses the result.
+        // If the caller has given up, nobody needs the result.
         let _ = send.send(work());
     });
     worker.context("there is no thread to read files on")?;
@@ -46,7 +46,7 @@ pub fn run<T: Send + 'static>(
             Err(RecvTimeoutError::Disconnected) => break,
         }
     }
-    // It ended without a result.
+    // The worker ended without a result.
     bail!(
         "{name}: reading it or its texture made this program panic, as said above; please report \
          it, with the files"

@@ -1,22 +1,22 @@
-//! What a file is, when it is not what its place asks for.
+//! Recognises a file whose format is not the expected one.
 
 use file_format::FileFormat;
 
-/// Returns the name of the format that a file begins as; none for a format that is not known, and
-/// for text of any kind. `size` is the whole file's, where it is known.
+/// Returns the name of the format that a file's first bytes show. Returns `None` for an unknown format and
+/// for plain text, except for UTF-16 and UTF-32. `size` is the size of the whole file, if known.
 pub fn name(begin: &[u8], size: Option<usize>) -> Option<String> {
-    // No format needs more bytes than this to be recognised.
+    // No format needs more bytes than these to be recognised.
     let begin = &begin[..begin.len().min(4096)];
     match begin {
         [0xFF, 0xFE, 0, 0, ..] | [0, 0, 0xFE, 0xFF, ..] => return Some("UTF-32 text".into()),
         [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] => return Some("UTF-16 text".into()),
-        // Without a mark: every other byte of the first characters is zero.
+        // Without a byte order mark: every other byte of the first characters is zero.
         [0, a, 0, b, ..] | [a, 0, b, 0, ..] if a.is_ascii_graphic() && is_text(*b) => {
             return Some("UTF-16 text".into());
         }
         _ => {}
     }
-    // The counted triangles, and nothing else: a text may begin in the same word.
+    // The size must fit the number of triangles, because a text can begin with the same word.
     if let Some((_, [a, b, c, d, ..])) = begin.split_at_checked(80)
         && let triangles = u32::from_le_bytes([*a, *b, *c, *d]) as usize
         && size == Some(84 + 50 * triangles)
@@ -55,7 +55,7 @@ pub fn name(begin: &[u8], size: Option<usize>) -> Option<String> {
     }
 }
 
-/// What markup is: what is looked for is in any program's first lines.
+/// Returns the format of markup, by a word that every program writes in the first lines.
 fn markup(text: &[u8]) -> &'static str {
     let text = text.to_ascii_lowercase();
     let has = |word: &[u8]| text.windows(word.len()).any(|window| window == word);

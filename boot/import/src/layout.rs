@@ -1,11 +1,11 @@
-//! How a model's texture is cut from its picture.
+//! Decides how a model's texture is cut from its image.
 //!
-//! An OBJ's texture has no end: it repeats to all sides. A texture here is a rectangle of at most
-//! 256 texels a side, so it gets what the faces use of that plane and no more. Each face is moved by
-//! whole textures to where its coordinates begin in the first one. The rectangle around all of them
-//! is then cut from the plane, and the picture is scaled down until it fits. A model that uses a
-//! corner of its picture has that corner in full sharpness; one that repeats it four times has a
-//! quarter of it. It is never scaled up.
+//! An OBJ's texture repeats without end on all sides. A texture of the renderer is a rectangle with at most
+//! 256 texels a side, so it gets only the part of that plane that the faces use. Each face is moved by whole
+//! images, so that its coordinates begin in the first image. The rectangle around all moved faces is then
+//! cut from the plane, and the image is scaled down until the rectangle fits. A model that uses a corner of
+//! its image has that corner at full sharpness; a model that repeats the image four times has it at a
+//! quarter. The image is never scaled up.
 
 use image::imageops::{FilterType, resize};
 use image::{Rgb, RgbImage};
@@ -13,34 +13,34 @@ use image::{Rgb, RgbImage};
 use crate::obj::BadLine;
 use crate::polygon::Polygon;
 
-/// Most times that a face may repeat the texture: then four texels are left of it.
+/// The most times that a face may repeat the texture: then four texels remain for each repetition.
 const MAX_REPEATS: f64 = 64.0;
-/// So far a coordinate may be beyond a border of the texture, in textures, and is taken to mean the
-/// border: programs write 1.0001, and half a texel is not seen.
+/// The distance beyond a border of the texture, in textures, up to which a coordinate counts as the border.
+/// Programs write 1.0001, and half a texel is not visible.
 const SLACK: f64 = 1.0 / 512.0;
-/// One texel of a corner's place.
+/// One texel in a corner's 16.16 coordinates.
 const TEXEL: f64 = 65_536.0;
 
-/// What is cut from the plane of repeated pictures, along one axis.
+/// The interval that is cut from the plane of repeated images, along one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Window {
-    /// Texels of the whole picture.
+    /// The texels of the whole image, after scaling.
     picture: u32,
-    /// The first texel that is cut, from the first picture's begin.
+    /// The first texel of the cut, relative to the start of the first image.
     first: i64,
-    /// How many are cut, 1 to 256.
+    /// The number of texels of the cut, 1 to 256.
     texels: u16,
 }
 
 impl Window {
-    /// For coordinates from `low` to `high`, in whole pictures of `pixels`.
+    /// Returns the interval for coordinates from `low` to `high`, in whole images of `pixels` pixels.
     fn around(low: f64, high: f64, pixels: u32) -> Self {
         let mut picture = pixels.min((256.0 / (high - low).max(1e-9)) as u32).max(1);
         loop {
             let first = (low * f64::from(picture)).floor() as i64;
             let end = (high * f64::from(picture)).ceil() as i64;
             let texels = (end - first).max(1);
-            // The borders of texels lie about the window's: it may be one too many.
+            // Rounded out to whole texels, the interval can be one texel too long.
             if texels <= 256 || picture == 1 {
                 return Self {
                     picture,
@@ -52,25 +52,26 @@ impl Window {
         }
     }
 
-    /// The place of a coordinate, 16.16.
+    /// Returns the position of a coordinate in the cut, 16.16.
     fn place(&self, coordinate: f64) -> i32 {
         let texel = coordinate * f64::from(self.picture) - self.first as f64;
         (texel.clamp(0.0, self.texels.into()) * TEXEL).round() as i32
     }
 
-    /// The picture's pixel of a texel.
+    /// Returns the pixel of the scaled image for a texel of the cut.
     fn pixel(&self, texel: u32) -> u32 {
         (self.first + i64::from(texel)).rem_euclid(self.picture.into()) as u32
     }
 }
 
-/// The whole pictures that a polygon is moved by, so that it begins in the first one.
+/// Returns the number of whole images to subtract from a polygon's coordinates, so that it begins in the
+/// first image.
 fn begin(polygon: &Polygon, axis: usize) -> f64 {
     let low = polygon.along(axis).fold(f64::INFINITY, f64::min);
     (low + SLACK).floor()
 }
 
-/// From where to where a polygon is in the pictures, once it was moved.
+/// Returns the interval of a polygon's coordinates, in whole images, after the move.
 fn range(polygon: &Polygon, axis: usize) -> (f64, f64) {
     let begin = begin(polygon, axis);
     let moved = polygon.along(axis).map(|place| place - begin);
@@ -82,7 +83,7 @@ fn range(polygon: &Polygon, axis: usize) -> (f64, f64) {
     (low.max(0.0), if over { border } else { high })
 }
 
-/// How a model's texture is cut from its picture.
+/// The cut of a model's texture from its image.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
     across: Window,
@@ -90,10 +91,10 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// What the polygons use of a picture of `size` pixels.
+    /// Returns the cut that the polygons need from an image of `width` x `height` pixels.
     ///
     /// # Errors
-    /// The first polygon that repeats the picture more often than `MAX_REPEATS` times.
+    /// For the first polygon that repeats the image more than `MAX_REPEATS` times.
     pub fn new(polygons: &[Polygon], (width, height): (u32, u32)) -> Result<Self, BadLine> {
         let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         for polygon in polygons {
@@ -121,12 +122,12 @@ impl Layout {
         })
     }
 
-    /// The texture's sides.
+    /// Returns the texture's width and height.
     pub fn size(&self) -> (u16, u16) {
         (self.across.texels, self.down.texels)
     }
 
-    /// Where a polygon's corners are in the texture, 16.16 texels.
+    /// Returns the positions of a polygon's corners in the texture, 16.16 texels.
     pub fn texels(&self, polygon: &Polygon) -> impl Iterator<Item = [i32; 2]> {
         let [across, down] = [0, 1].map(|axis| begin(polygon, axis));
         let u = polygon.along(0).map(move |u| self.across.place(u - across));
@@ -134,8 +135,8 @@ impl Layout {
         u.zip(v).map(|(u, v)| [u, v])
     }
 
-    /// The texels, row by row. `pixel` has the picture's pixel in a column and a row, when it is
-    /// scaled to [`Layout::scaled`].
+    /// Returns the texels, row by row. `pixel` returns the pixel in a column and a row of the image, scaled
+    /// to [`Layout::scaled`].
     pub fn cut<T>(&self, pixel: impl Fn(u32, u32) -> T) -> Vec<T> {
         let (columns, rows) = self.size();
         let mut texels = Vec::with_capacity(usize::from(columns) * usize::from(rows));
@@ -147,12 +148,12 @@ impl Layout {
         texels
     }
 
-    /// The size that the whole picture is scaled to; never larger than it is.
+    /// Returns the size to which the whole image is scaled, never larger than the image.
     pub fn scaled(&self) -> (u32, u32) {
         (self.across.picture, self.down.picture)
     }
 
-    /// The texels of a picture, row by row.
+    /// Returns the texels of an image, row by row.
     pub fn cut_scaled(&self, picture: &RgbImage) -> Vec<Rgb<u8>> {
         let (width, height) = self.scaled();
         if picture.dimensions() == (width, height) {
@@ -170,14 +171,14 @@ mod tests {
     use crate::polygon::Polygons;
     use crate::texture::MAX_PIXELS;
 
-    /// The layout of triangles with these coordinates, and where their corners are in texels.
+    /// Returns the layout of triangles with these coordinates, and the positions of their corners in texels.
     fn laid_out(triangles: &[[[f64; 2]; 3]], picture: (u32, u32)) -> (Layout, Vec<[f64; 2]>) {
         let mut text = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
         for [u, v] in triangles.as_flattened() {
             text += &format!("vt {u} {v}\n");
         }
         for i in 0..triangles.len() {
-            // Against the clock, so that they come back in their order.
+            // Counter-clockwise, so that the polygons have the corners in this order.
             let [a, b, c] = [1, 2, 3].map(|k| 3 * i + k);
             text += &format!("f 3/{c} 2/{b} 1/{a}\n");
         }

@@ -1,4 +1,4 @@
-//! A model of the user's own: a Wavefront OBJ and a PNG, made into a pack.
+//! Makes a model file from the user's model: a Wavefront OBJ and a PNG.
 //!
 //! ```text
 //! OBJ -> polygons on the grid -> layout of the texture -> mesh   \
@@ -6,8 +6,8 @@
 //!                               -> texels, palette, light table  /
 //! ```
 //!
-//! All of it is done here, once, in floating point where that is easier; what comes out is integers
-//! ([`pack`] has the format). The same files make the same pack.
+//! All work is done here, once, in floating point where that is easier. The result consists of integers
+//! ([`pack`] has the format), and the same files give the same result.
 
 pub mod colour;
 mod guard;
@@ -39,14 +39,15 @@ use obj::{BadLine, Obj};
 use polygon::{Polygons, Tally};
 use texture::Picture;
 
-/// Most bytes of an OBJ: far more than a model of [`scene::MAX_FACES`] faces has.
+/// The maximum size of an OBJ in bytes: far more than a model of [`scene::MAX_FACES`] faces has.
 const MAX_BYTES: u64 = 64 << 20;
-/// Longest time that making a model may take: far more than the largest one takes.
+/// The time limit for making a model: far more than the largest model needs.
 const MOST_TIME: Duration = Duration::from_secs(120);
-/// Bytes of a ramdisk that the boot loader reads in a second from the disk that this program gives
-/// QEMU: 16 MiB took 8.6 s longer than none. From an IDE disk it is a sixth of that.
+/// The bytes of a ramdisk that the boot loader reads in a second from the disk that this program gives QEMU:
+/// 16 MiB took 8.6 s longer than no ramdisk. From an IDE disk, the rate is a sixth of this.
 const BYTES_A_SECOND: f64 = 2e6;
-/// The scene whose texture a model gets that has none: its lines show how it lies.
+/// The scene whose texture a model without a texture gets. The lines of that texture show how it lies on the
+/// model.
 const PATTERN: &str = "tilted";
 
 /// The files of a model.
@@ -55,16 +56,16 @@ pub struct Files {
     /// Your own model: a Wavefront OBJ
     #[arg(long, global = true, value_name = "FILE.obj")]
     pub model: Option<PathBuf>,
-    /// Its texture, a PNG; transparent parts are drawn over grey (808080) [default: a marble board]
+    /// The model's texture: a PNG; transparent parts are drawn over grey (808080) [default: a marble board]
     #[arg(long, global = true, value_name = "FILE.png")]
     pub texture: Option<PathBuf>,
 }
 
 impl Files {
-    /// Makes the model's pack, if there is a model; a texture alone makes none.
+    /// Makes the model file. Returns `None` if no model is given, even with a texture.
     ///
     /// # Errors
-    /// A file that can't be used, with its name, the line where there is one, and the reason.
+    /// If a file cannot be used. The message has the file's name, the line if there is one, and the reason.
     pub fn load(&self) -> anyhow::Result<Option<Model>> {
         match &self.model {
             Some(model) => Model::load(model, self.texture.as_deref()).map(Some),
@@ -73,12 +74,12 @@ impl Files {
     }
 }
 
-/// A model, packed.
+/// A model in the form of a model file.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Model {
-    /// The pack's bytes.
+    /// The model file's bytes.
     pub bytes: Vec<u8>,
-    /// What became of its files, for people.
+    /// A summary of the import, for people.
     about: String,
 }
 
@@ -88,7 +89,7 @@ impl fmt::Debug for Model {
     }
 }
 
-/// What became of the files, in a line.
+/// Writes the summary of the import.
 impl fmt::Display for Model {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.about)
@@ -96,11 +97,10 @@ impl fmt::Display for Model {
 }
 
 impl Model {
-    /// Makes a model of an OBJ, and of a PNG for a texture; without one it gets a pattern.
+    /// Makes a model from an OBJ, and from a PNG as its texture. Without a PNG the model gets a pattern.
     ///
     /// # Errors
-    /// As [`Files::load`]. [`Interrupted`](system::Interrupted) as soon as the user asks to
-    /// stop.
+    /// As [`Files::load`]. [`Interrupted`](system::Interrupted) as soon as the user stops the program.
     pub fn load(obj: &Path, png: Option<&Path>) -> anyhow::Result<Self> {
         let (obj, png) = (obj.to_owned(), png.map(Path::to_owned));
         let name = quote::path(&obj);
@@ -127,10 +127,10 @@ impl Model {
         })
     }
 
-    /// Makes a model of an OBJ's bytes and a picture.
+    /// Makes a model from an OBJ's bytes and an image.
     ///
     /// # Errors
-    /// As [`Files::load`], without the name.
+    /// As [`Files::load`], without the file's name.
     pub fn new(obj: &[u8], picture: Option<&Picture>) -> anyhow::Result<Self> {
         let pixels = picture.map(|picture| &picture.pixels);
         let size = obj.len();
@@ -141,7 +141,7 @@ impl Model {
             ),
             None => error,
         };
-        // A page may hold the text of an OBJ.
+        // An HTML page can contain the text of an OBJ.
         let text = obj.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(obj);
         if text.trim_ascii_start().starts_with(b"<") {
             return Err(other(anyhow!("it is no OBJ")));
@@ -168,7 +168,8 @@ impl Model {
                 palette,
                 light,
             }) => (texels.clone(), Colours { palette, light }),
-            // Its colours are entries of the palette: it is scaled by leaving texels out.
+            // The pattern's texels are entries of the palette, which cannot be averaged, so it is scaled by
+            // leaving texels out.
             None => {
                 let (width, height) = layout.scaled();
                 let pixel = |i, j| {
@@ -192,7 +193,7 @@ impl Model {
         };
         let mut bytes = Vec::new();
         parts.write(|part| bytes.extend_from_slice(part));
-        // What the kernel would refuse must not go on a way of seconds to be told so.
+        // The kernel would refuse a wrong model file only seconds later, after the boot.
         Pack::parse(&bytes).context("its pack is wrong, which is this program's fault")?;
         Ok(Self {
             about: about(&obj, &solid, (width, height), picture),
@@ -200,22 +201,22 @@ impl Model {
         })
     }
 
-    /// Its pack.
+    /// Returns the model file.
     pub fn pack(&self) -> Pack<'_> {
         Pack::parse(&self.bytes).expect("it was read when it was made")
     }
 
-    /// How much longer the boot loader takes to read an image with it, in seconds.
+    /// Returns how much longer the boot loader needs to read an image with this model, in seconds.
     pub fn boot_seconds(&self) -> f64 {
         self.bytes.len() as f64 / BYTES_A_SECOND
     }
 }
 
-/// An OBJ's mesh, and how its texture is cut from a picture of so many pixels.
+/// Returns an OBJ's mesh, and the way to cut its texture from an image of `picture` pixels.
 ///
 /// # Errors
-/// No face that can be drawn, more of something than a pack may have, or a face that repeats the
-/// picture too often.
+/// If no face can be drawn, if the mesh exceeds a limit of a model file, or if a face repeats the image too
+/// often.
 pub fn solid(obj: &Obj, picture: (u32, u32)) -> anyhow::Result<(Solid, Layout)> {
     let polygons = Polygons::new(obj)?;
     let layout = Layout::new(&polygons.polygons, picture)?;
@@ -238,7 +239,7 @@ fn read_obj(path: &Path) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// What to do about a model of another format.
+/// Returns what the user can do about a model of another format.
 fn remedy(kind: &str) -> &'static str {
     match kind {
         "PNG" => "a picture goes behind --texture",
@@ -248,7 +249,7 @@ fn remedy(kind: &str) -> &'static str {
     }
 }
 
-/// What became of the files: a line, and a line for each thing that the user may not expect.
+/// Returns the summary of the import: a line, and a note if the whole model faces the wrong way.
 fn about(
     obj: &Obj,
     solid: &Solid,

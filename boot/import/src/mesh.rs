@@ -2,11 +2,11 @@
 //!
 //! # Whole, or cut
 //!
-//! A face of the renderer is convex, flat, and has one texture plane. A polygon that is all of it
-//! stays whole, up to [`MAX_CORNERS`] corners; any other is cut into triangles by ears, which fit
-//! always. Flat is what bends by at most `FLATNESS`, and one plane is what is off by at most
-//! `TEXEL_FIT` texels at a corner: less than can be seen. All pieces of a polygon have its normal,
-//! so that no cut shows in the light.
+//! A face of the renderer is convex and flat, and has one texture plane. A polygon that meets all three
+//! conditions stays whole, up to [`MAX_CORNERS`] corners. Any other polygon is cut into triangles by ear
+//! clipping, and triangles always meet the conditions. A polygon is flat if it bends by at most `FLATNESS`,
+//! and it has one texture plane if no corner is more than `TEXEL_FIT` texels off that plane: smaller errors
+//! are not visible. All pieces of a polygon have the polygon's normal, so that the light shows no cuts.
 
 use anyhow::ensure;
 use earcut::Earcut;
@@ -19,42 +19,43 @@ use crate::obj::{BadLine, SIMPLIFY};
 use crate::polygon::{GRID, Place, Polygons, Tally};
 use crate::vector::{cross, dot, minus};
 
-/// Furthest that a corner of a face may be from the face's plane, in units: a fifteenth of a pixel
-/// at the default distance.
+/// The largest difference in height of a face's corners over its plane, in units: a fifteenth of a pixel at
+/// the default distance.
 const FLATNESS: f64 = 1.0 / 2048.0;
-/// Furthest that a corner of a face may be from its place in the face's texture plane, in texels.
+/// The largest distance of a corner's texture coordinates from the face's texture plane, in texels.
 const TEXEL_FIT: f64 = 1.0 / 16.0;
-/// Smallest part of a face's area that the three corners may have that its texture plane is made of.
+/// The smallest part of a face's area that the triangle of the texture plane's three corners may have.
 const LEAST_ANCHORED: f64 = 1.0 / 16.0;
-/// A solid, owned.
+/// A mesh that owns its data.
 #[derive(Clone, Debug, Default)]
 pub struct Solid {
-    /// As [`scene::Mesh`] has them.
+    /// The vertices, as in [`scene::Mesh`].
     pub vertices: Vec<Vec3>,
-    /// As [`scene::Mesh`] has them.
+    /// The corners, as in [`scene::Mesh`].
     pub corners: Vec<Corner>,
-    /// As [`scene::Mesh`] has them, but for `first`, which is left zero.
+    /// The faces, as in [`scene::Mesh`], but with `first` left at zero.
     pub faces: Vec<Face>,
-    /// What became of the file's faces.
+    /// What happened to the file's faces.
     pub tally: Tally,
 }
 
-/// Whether a solid's faces look to where they are seen from.
+/// Whether a solid's faces face a viewer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Turned {
-    /// Some do.
+    /// Some faces face the viewer.
     Seen,
-    /// All look to the side that the solid's middle is on: it is inside out.
+    /// All faces face the solid's centre: the solid is inside out.
     Inside,
-    /// None looks to the viewer in the first frame.
+    /// No face faces the viewer in the first frame.
     Away,
 }
 
 impl Solid {
-    /// Makes the mesh of polygons, with corners placed in the texture that `layout` cuts.
+    /// Makes a mesh from polygons, with corners placed in the texture that `layout` cuts.
     ///
     /// # Errors
-    /// More faces or corners than a pack may have.
+    /// If there are more faces or corners than a model file may have, or no polygon can be cut into
+    /// triangles.
     pub fn new(polygons: Polygons, layout: &Layout) -> anyhow::Result<Self> {
         let Polygons {
             vertices,
@@ -67,7 +68,7 @@ impl Solid {
             ..Self::default()
         };
         let mut ears = Ears::default();
-        // Faces, if cutting leaves out no triangle.
+        // The number of faces, if each cut yields all its triangles.
         let mut triangles = 0;
         for polygon in &polygons {
             let places = layout.texels(polygon);
@@ -95,7 +96,8 @@ impl Solid {
             let n = corners.len();
             let whole = first_of_whole(&polygon.ring, polygon.normal, &corners);
             triangles += whole.map_or(n - 2, |_| 1);
-            // Before it is cut: a face that runs over the same points again and again takes seconds.
+            // Checked before the cut, because to cut a face that visits the same points again and again
+            // needs seconds.
             if triangles > MAX_FACES {
                 let why = format!(
                     "with this face cut into triangles the model has more than {MAX_FACES} faces \
@@ -128,7 +130,7 @@ impl Solid {
         Ok(solid)
     }
 
-    /// Finds out whether the faces were made with the other winding rule.
+    /// Returns which way the faces look, to find a file with the opposite winding rule.
     pub fn turned(&self) -> Turned {
         let pose = Pose::at_tick(0);
         let turn = pose.orientation();
@@ -137,7 +139,8 @@ impl Solid {
         for face in &self.faces {
             let (own, rest) = corners.split_at(face.corners.into());
             corners = rest;
-            // Any point of its plane does; the face may be bent, so the middle of its corners.
+            // Any point of the face's plane will do. The face may be bent, so this is the mean of its
+            // corners.
             let vertex = |corner: &Corner| self.vertices[usize::from(corner.vertex)];
             let sum = own.iter().map(vertex).fold([0.0; 3], |sum, at| {
                 [0, 1, 2].map(|k| sum[k] + f64::from(at[k]))
@@ -156,7 +159,7 @@ impl Solid {
     }
 }
 
-/// Of a polygon that stays whole, the corner to begin with; nothing if it has to be cut.
+/// Returns the first corner of a polygon that stays whole, or `None` if the polygon must be cut.
 fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Option<usize> {
     let n = ring.len();
     if n == 3 {
@@ -165,7 +168,8 @@ fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Optio
     if n > MAX_CORNERS {
         return None;
     }
-    // Each corner's distance to the left of each edge, as an area on the plane: none may be outside.
+    // A corner's signed distance from an edge, as an area on the plane. In a convex polygon, no corner is
+    // outside any edge.
     let area =
         |a: &Place, b: &Place, c: &Place| dot(cross(minus(b.at, a.at), minus(c.at, a.at)), normal);
     let convex = (0..n).all(|i| {
@@ -182,8 +186,8 @@ fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Optio
     if !convex || high - low > FLATNESS * GRID {
         return None;
     }
-    // The texture plane goes through these three corners, counted from the first: the renderer's
-    // choice. They must not be on a line.
+    // The renderer puts the texture plane through these three corners, counted from the first. They must not
+    // be on a line.
     let anchors = |first: usize| [0, n / 3, 2 * n / 3].map(|i| (first + i) % n);
     let anchored = |first: usize| {
         let [a, b, c] = anchors(first).map(|i| &ring[i]);
@@ -196,7 +200,7 @@ fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Optio
     let three = anchors(first);
     let [a, b, c] = three.map(|i| &ring[i]);
     let fits = ring.iter().zip(corners).all(|(place, corner)| {
-        // How much each of the three counts here.
+        // The weights of the three corners at this place.
         let weights = [area(b, c, place), area(c, a, place), area(a, b, place)];
         let total: f64 = weights.iter().sum();
         let off = |value: fn(&Corner) -> i32| {
@@ -219,7 +223,7 @@ struct Ears {
 }
 
 impl Ears {
-    /// The triangles of a polygon, each with its corners in the polygon's order.
+    /// Returns the triangles of a polygon, each with its corners in the polygon's order.
     fn cut(&mut self, ring: &[Place]) -> Vec<[usize; 3]> {
         let points: Vec<_> = ring.iter().map(|place| place.at).collect();
         self.cut.clear();
@@ -255,7 +259,7 @@ mod tests {
         solid
     }
 
-    /// Each face's corners.
+    /// Returns each face's corners.
     fn faces(solid: &Solid) -> Vec<Vec<Corner>> {
         let mut rest = &solid.corners[..];
         let faces = solid.faces.iter().map(|face| {
@@ -268,7 +272,7 @@ mod tests {
         faces
     }
 
-    /// Twice a face's area along its normal, in units; below zero when it is inside out.
+    /// Returns twice a face's area along its normal, in square units; negative if the face is inside out.
     fn area(solid: &Solid, face: &Face, corners: &[Corner]) -> f64 {
         let at = |i: usize| solid.vertices[usize::from(corners[i].vertex)].map(f64::from);
         let sides =
@@ -284,7 +288,7 @@ mod tests {
         let [face] = &faces(&solid)[..] else {
             panic!("{solid:?}");
         };
-        // Looking at it from the front, y is up in the file: clockwise from some corner.
+        // Seen from the front, y points up in the file, so the corners are clockwise from some corner.
         let side = 256 << 16;
         let r = (RADIUS * GRID / 2f64.sqrt()).round() as i32;
         let clockwise = [
@@ -309,7 +313,7 @@ mod tests {
             (0..4).all(|i| found[i] == clockwise[(first + i) % 4]),
             "{found:?}"
         );
-        // It looks at who sits before the screen.
+        // The face looks at a viewer in front of the screen.
         assert_eq!(solid.faces[0].normal, [0, 0, -16_384]);
     }
 
@@ -330,7 +334,7 @@ mod tests {
         for (text, pieces, expected) in [
             (format!("{SQUARE}f 1/1 2/2 3/3 4/5\n"), 2, sized(4.0)),
             (format!("{bent}f 1/1 2/2 3/3 4/4\n"), 2, 0.0),
-            // A corner that bends inwards.
+            // A concave corner.
             (
                 "v 0 0 0\nv 2 0 0\nv .5 .5 0\nv 0 2 0\nf 1 2 3 4\n".into(),
                 2,
@@ -347,7 +351,7 @@ mod tests {
                 10,
                 sized(12.0 * (std::f64::consts::TAU / 12.0).sin()),
             ),
-            // A star of twelve points.
+            // A star with twelve points.
             (
                 rim(24),
                 22,
@@ -368,7 +372,7 @@ mod tests {
                 expected == 0.0 || (sum - expected).abs() < 1e-3,
                 "{sum}, {expected}"
             );
-            // No cut shows in the light.
+            // The light shows no cuts.
             assert!(
                 solid
                     .faces
@@ -380,7 +384,8 @@ mod tests {
 
     #[test]
     fn the_texture_plane_is_not_made_of_corners_on_a_line() {
-        // The middle of the lower side is a corner as well: the renderer would take the three of it.
+        // The middle of the lower side is a corner as well, so that some choices of three corners make a
+        // narrow triangle.
         let text = format!("{SQUARE}v .5 0 0\nvt .5 0\nf 1/1 5/6 2/2 3/3 4/4\n");
         let solid = made(&text);
         let [face] = &faces(&solid)[..] else {
@@ -410,11 +415,11 @@ mod tests {
         let obj = obj::parse(text.as_bytes()).unwrap();
         let (solid, layout) = solid(&obj, (256, 256)).unwrap();
         assert_eq!((solid.tally.projected, solid.faces.len()), (6, 6));
-        // The cube's sides are 1.15 of the 2 that its ball is wide.
+        // The cube's edge is 1.15 times the radius of its ball, so it covers 1.15 of the projection's 2.
         assert_eq!(layout.size(), (148, 148));
         for (face, corners) in solid.faces.iter().zip(faces(&solid)) {
             assert!(area(&solid, face, &corners) > 0.0);
-            // Clockwise on the screen is clockwise in the texture: nothing is mirrored.
+            // Corners that are clockwise on the screen are clockwise in the texture, so nothing is mirrored.
             let [a, b, c] = [0, 1, 2].map(|i: usize| [corners[i].u, corners[i].v].map(f64::from));
             let turn = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
             assert!(turn > 0.0, "{corners:?}");

@@ -1,24 +1,24 @@
-//! Wavefront OBJ files: positions, places in a texture, and faces of any size.
+//! A parser for Wavefront OBJ files: positions, texture coordinates, and faces of any size.
 //!
-//! This is our own parser, because it must name the line of every error, and no library does that:
-//! tobj's errors have neither line nor value, obj-rs panics at legal statements (`unimplemented!`),
-//! and wavefront_obj refuses negative indices and cuts every face to a fan. A library would save us
-//! the splitting of lines into words.
+//! The project has its own parser because a parser must name the line of every error, and no library does:
+//! tobj's errors have neither line nor value, obj-rs panics at legal statements (`unimplemented!`), and
+//! wavefront_obj refuses negative indices and cuts every face into a fan. A library would only save the
+//! splitting of lines into words.
 //!
 //! # What is read
 //!
-//! Only what a face uses is read, so only that can be refused. Faces are read first. Then the
-//! positions and places that they name are read, and no others: a vertex that no face uses may
-//! have any words for numbers. Normals are never read, neither their numbers nor their indices:
-//! faces are flat. Names, groups and materials are skipped. All other statements (points, lines,
-//! curves, tags of other programs) are left out and counted.
+//! The parser reads only what a face uses, so it can refuse nothing else. It reads the faces first, and then
+//! only the positions and texture coordinates that they name: a vertex that no face uses may have any words
+//! for numbers. It never reads normals, neither their numbers nor their indices, because faces are flat. It
+//! skips names, groups and materials. It leaves out all other statements (points, lines, curves, tags of
+//! other programs) and counts them.
 //!
 //! # Lines
 //!
-//! CR, LF or CR LF ends a line, in any mix. Spaces, tabs, vertical tabs and form feeds separate
-//! words. A word that begins with `#` begins a comment. A `\` at the end of a line, blanks behind
-//! it or not, joins the next line to it, unless that begins with a keyword: then the `\` is the end
-//! of a name (`usemtl mats\`).
+//! CR, LF or CR LF ends a line, in any mix. Spaces, tabs, vertical tabs and form feeds separate words. A
+//! word that begins with `#` begins a comment. A `\` at the end of a line, with or without blanks after it,
+//! joins the next line to it, unless the next line begins with a keyword: then the `\` is the end of a name
+//! (`usemtl mats\`).
 
 use std::borrow::Cow;
 use std::fmt;
@@ -26,68 +26,70 @@ use std::fmt;
 use scene::MAX_VERTICES;
 use system::quote::quoted;
 
-/// Largest coordinate, either sign: a model's size is squared on the way.
+/// The largest coordinate, of either sign. The limit leaves room for the squares that are computed later.
 const MAX_COORDINATE: f64 = 1e30;
-/// Most corners of a face: those of an outline that is extruded, so that a mesh has room for it
-/// twice. Cutting a face that runs over the same points again and again takes a time that grows
-/// with the cube of its corners: seconds for so many, 329 s for 16 000.
+/// The maximum number of corners of a face: an outline with this many can be extruded, because a mesh has
+/// room for it twice. To cut a face that visits the same points again and again needs a time that grows with
+/// the cube of its corners: seconds at this limit, 329 s at 16 000.
 pub const MAX_CORNERS: usize = MAX_VERTICES / 2;
-/// Most faces of a file, and most corners of all of them. A mesh has room for far fewer; the rest
-/// may have no area. The limits bound the memory that a file can ask for.
+/// The maximum number of faces of a file, and of corners of all its faces. A mesh has room for far fewer,
+/// but the rest may have no area. The limits bound the memory that a file can ask for.
 const MAX_READ: usize = 1 << 20;
 const MAX_READ_CORNERS: usize = 4 * MAX_READ;
 
-/// The statements that are skipped without a word: names, groups, smoothing, materials, normals.
+/// The statements that are skipped without a message: names, groups, smoothing, materials, normals.
 const SKIPPED: [&[u8]; 6] = [b"g", b"mtllib", b"o", b"s", b"usemtl", b"vn"];
-/// The keywords that begin a statement, whatever the line before ends in: those that files have.
+/// The keywords that begin a statement, even if the line before ends with a `\`: the keywords that occur in
+/// files.
 const KEYWORDS: [&[u8]; 13] = [
     b"f", b"fo", b"g", b"l", b"mtllib", b"o", b"p", b"s", b"usemtl", b"v", b"vn", b"vp", b"vt",
 ];
-/// How many kinds of left-out statements the message names.
+/// The maximum number of kinds of left-out statements that the message names.
 const KINDS: usize = 6;
 
-/// What an OBJ file has of polygons.
+/// The polygons of an OBJ file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Obj {
-    /// x right, y up, z towards the viewer; finite. Zeros where no face uses it.
+    /// Positions: x right, y up, z towards the viewer; finite. Positions that no face uses are zeros.
     pub positions: Vec<[f64; 3]>,
-    /// Places in the texture: u to the right, v up, one being the whole of it; finite. Zeros where
-    /// no face uses it.
+    /// Texture coordinates: u to the right, v up, the whole texture from 0 to 1; finite. Texture coordinates
+    /// that no face uses are zeros.
     pub places: Vec<[f64; 2]>,
-    /// Corners of all faces.
+    /// The corners of all faces.
     pub corners: Vec<Corner>,
-    /// Faces.
+    /// The faces.
     pub faces: Vec<Face>,
-    /// The statements that are not known, or make no polygon.
+    /// The statements that are unknown, or make no polygon.
     pub left_out: LeftOut,
 }
 
 /// A corner of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Corner {
-    /// Which of the positions.
+    /// The index of the position.
     pub position: u32,
-    /// Which of the places. Either all corners of a face have one, or none has.
+    /// The index of the texture coordinates. Either all corners of a face have texture coordinates, or no
+    /// corner has.
     pub place: Option<u32>,
 }
 
-/// A polygon, counter-clockwise as it is seen from its front.
+/// A polygon, counter-clockwise when seen from its front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Face {
-    /// Its first corner.
+    /// The index of the first corner.
     pub first: usize,
-    /// How many corners, at most [`MAX_CORNERS`].
+    /// The number of corners, at most [`MAX_CORNERS`].
     pub corners: usize,
-    /// The line that it is on, counted from 1.
+    /// The line in the file, counted from 1.
     pub line: usize,
 }
 
 /// The statements that were left out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LeftOut {
-    /// How many.
+    /// The number of statements.
     pub count: usize,
-    /// The first keywords in the order of the file, the first line and the number of each.
+    /// The first keywords in the order of the file, each with its first line and its number of statements.
     pub kinds: Vec<(Vec<u8>, usize, usize)>,
 }
 
@@ -103,7 +105,7 @@ impl LeftOut {
     }
 }
 
-/// Says how many statements there are, and of which kinds.
+/// Writes how many statements were left out, and of which kinds.
 impl fmt::Display for LeftOut {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let s = if self.count == 1 { "" } else { "s" };
@@ -125,18 +127,18 @@ impl fmt::Display for LeftOut {
 }
 
 impl Obj {
-    /// The corners of one of the faces.
+    /// Returns the corners of a face.
     pub fn corners_of(&self, face: &Face) -> &[Corner] {
         &self.corners[face.first..][..face.corners]
     }
 }
 
-/// What is wrong with a line.
+/// An error in a line of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BadLine {
-    /// The line, counted from 1; of a statement over several lines the first.
+    /// The line, counted from 1. For a statement over several lines, it is the first.
     pub line: usize,
-    /// What is wrong with it, and what to do.
+    /// What is wrong with the line, and what to do.
     pub why: String,
 }
 
@@ -148,11 +150,12 @@ impl fmt::Display for BadLine {
 
 impl std::error::Error for BadLine {}
 
-/// Reads a file's bytes. They need not be UTF-8: names are in any encoding.
+/// Parses a file's bytes. They need not be UTF-8, because names can have any encoding.
 ///
 /// # Errors
-/// The first face that is wrong; then the first position or place that is wrong and that a face
-/// uses. Of a file without faces, which is no model, the first line that no OBJ has.
+/// The first wrong face; else the first wrong position or texture coordinate that a face uses. A file
+/// without faces is no model: then the error is the first wrong position or texture coordinate, or an
+/// unknown statement that comes before it or in a file without positions.
 pub fn parse(bytes: &[u8]) -> Result<Obj, BadLine> {
     let bytes = bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes);
     let mut obj = Obj::default();
@@ -176,21 +179,21 @@ pub fn parse(bytes: &[u8]) -> Result<Obj, BadLine> {
     match (wrong, unknown) {
         (Some(wrong), Some(unknown)) if unknown.line < wrong.line => Err(unknown),
         (Some(wrong), _) => Err(wrong),
-        // Text of another kind.
+        // A text of another kind.
         (None, Some(unknown)) if counts.positions == 0 => Err(unknown),
         // Points or lines.
         _ => Ok(obj),
     }
 }
 
-/// How many there are of each, or which of each.
+/// A value for the positions, and a value for the texture coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 struct Each<T> {
     positions: T,
     places: T,
 }
 
-/// Reads the faces, and counts what they name.
+/// Reads the faces, and counts the positions and texture coordinates.
 fn faces(bytes: &[u8], obj: &mut Obj) -> Result<Each<usize>, BadLine> {
     let mut there = Each::default();
     for statement in Statements::new(bytes) {
@@ -247,7 +250,7 @@ fn face<'a>(
     }
     let own = &mut obj.corners[first..];
     if own.iter().any(|corner| corner.place.is_none()) {
-        // It gets coordinates made up, and uses none of the file's.
+        // The face gets projected coordinates, and uses no coordinates of the file.
         own.iter_mut().for_each(|corner| corner.place = None);
     }
     obj.faces.push(Face {
@@ -258,10 +261,10 @@ fn face<'a>(
     Ok(())
 }
 
-/// What to do about a model that is too large.
+/// What the user can do about a model that is too large.
 pub const SIMPLIFY: &str = "simplify it in the program that made it";
 
-/// Reads a corner: `1`, `1/2`, `1//3` or `1/2/3`. The normal's index may be anything.
+/// Reads a corner: `1`, `1/2`, `1//3` or `1/2/3`. The normal's index can be any text.
 fn corner(word: &[u8], there: Each<usize>) -> Result<Corner, String> {
     let mut parts = word.split(|&byte| byte == b'/');
     let mut index = |what, there| match parts.next() {
@@ -284,8 +287,8 @@ fn corner(word: &[u8], there: Each<usize>) -> Result<Corner, String> {
     Ok(Corner { position, place })
 }
 
-/// An index, counted from 0. Counted from 1 in the file, it may come before what it names; below
-/// zero it counts back from the last one before it.
+/// Converts an index of the file, counted from 1, to an index counted from 0. A positive index may precede
+/// what it names. A negative index counts back from the last element before the line.
 fn from_zero(word: &[u8], there: usize) -> Result<u32, String> {
     let number = std::str::from_utf8(word).ok();
     let number = number.and_then(|word| word.parse::<i128>().ok());
@@ -304,10 +307,10 @@ fn from_zero(word: &[u8], there: usize) -> Result<u32, String> {
     }
 }
 
-/// Which positions and places the faces use.
+/// Returns which positions and texture coordinates the faces use.
 ///
 /// # Errors
-/// The first face that uses one that does not exist.
+/// The first face that uses an element that does not exist.
 fn used(obj: &Obj, there: Each<usize>) -> Result<Each<Vec<bool>>, BadLine> {
     let mut used = Each {
         positions: vec![false; there.positions],
@@ -342,7 +345,7 @@ fn used(obj: &Obj, there: Each<usize>) -> Result<Each<Vec<bool>>, BadLine> {
 
 /// Reads the coordinates that are used.
 fn coordinates(bytes: &[u8], obj: &mut Obj, used: &Each<Vec<bool>>) -> Result<(), BadLine> {
-    // Zeroed memory that is never written is never taken.
+    // Zeroed memory that is never written needs no physical memory.
     obj.positions = vec![[0.0; 3]; used.positions.len()];
     obj.places = vec![[0.0; 2]; used.places.len()];
     let mut positions = obj.positions.iter_mut().zip(&used.positions);
@@ -350,12 +353,12 @@ fn coordinates(bytes: &[u8], obj: &mut Obj, used: &Each<Vec<bool>>) -> Result<()
     for statement in Statements::new(bytes) {
         let mut words = words(&statement.text);
         let read = match words.next() {
-            // Behind the coordinates there may be a weight, or a colour.
+            // A weight or a colour may follow the coordinates.
             Some(b"v") => match positions.next() {
                 Some((position, true)) => numbers("v", words, position, 3),
                 _ => Ok(()),
             },
-            // v may be missing; behind it there may be a depth.
+            // v may be missing. A depth may follow it.
             Some(b"vt") => match places.next() {
                 Some((place, true)) => numbers("vt", words, place, 1),
                 _ => Ok(()),
@@ -370,7 +373,7 @@ fn coordinates(bytes: &[u8], obj: &mut Obj, used: &Each<Vec<bool>>) -> Result<()
     Ok(())
 }
 
-/// Reads a statement's first numbers; `least` of them must exist, the others stay zeros.
+/// Reads a statement's first numbers. At least `least` numbers must exist; the others stay zero.
 fn numbers<'a>(
     keyword: &str,
     mut words: impl Iterator<Item = &'a [u8]>,
@@ -411,28 +414,28 @@ fn number(word: &[u8]) -> Result<f64, String> {
     Ok(number)
 }
 
-/// Whether a byte separates words.
+/// Returns whether a byte separates words.
 fn is_blank(byte: &u8) -> bool {
     matches!(byte, b' ' | b'\t' | 0x0B | 0x0C)
 }
 
-/// The words of a statement, up to a comment.
+/// Returns the words of a statement, up to a comment.
 fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(is_blank)
         .filter(|word| !word.is_empty())
         .take_while(|word| word[0] != b'#')
 }
 
-/// A statement, its lines joined.
+/// A statement, with its lines joined.
 struct Statement<'a> {
     text: Cow<'a, [u8]>,
-    /// Its first line, counted from 1.
+    /// The statement's first line, counted from 1.
     line: usize,
-    /// The file ends where it goes on.
+    /// Whether the file ends where the statement should continue.
     cut: bool,
 }
 
-/// Takes the statements off the front of a file.
+/// An iterator over the statements of a file.
 struct Statements<'a> {
     rest: Option<&'a [u8]>,
     line: usize,
@@ -446,7 +449,7 @@ impl<'a> Statements<'a> {
         }
     }
 
-    /// The next line, without its end.
+    /// Returns the next line, without its end.
     fn line(&mut self) -> Option<&'a [u8]> {
         let rest = self.rest?;
         self.line += 1;
@@ -460,7 +463,7 @@ impl<'a> Statements<'a> {
         Some(line)
     }
 
-    /// Whether the next line begins a statement of its own.
+    /// Returns whether the next line begins a new statement.
     fn begins_anew(&self) -> bool {
         let next = self.rest.unwrap_or_default();
         let end = next.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
@@ -471,11 +474,11 @@ impl<'a> Statements<'a> {
     }
 }
 
-/// A line without the `\` at its end, if it has one and is no comment.
+/// Returns a line without the `\` at its end, or `None` if it has no `\` there or has a comment.
 fn continued(line: &[u8]) -> Option<&[u8]> {
     let blanks = line.iter().rev().take_while(|byte| is_blank(byte)).count();
     let whole = line[..line.len() - blanks].strip_suffix(b"\\")?;
-    // A comment ends with its line, whatever that ends in.
+    // A comment ends with its line, even if a `\` comes last.
     let comment = line.split(is_blank).any(|word| word.first() == Some(&b'#'));
     (!comment).then_some(whole)
 }
@@ -560,7 +563,7 @@ mod tests {
 
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
 
-    /// The faces and coordinates of a text that is read, without their lines.
+    /// Returns the faces and coordinates of a text, without their lines.
     fn read(text: &[u8]) -> (Vec<[f64; 3]>, Vec<[f64; 2]>, Vec<Corner>) {
         let obj = parse(text).unwrap_or_else(|error| panic!("{}: {error}", text.escape_ascii()));
         (obj.positions, obj.places, obj.corners)
@@ -579,7 +582,7 @@ mod tests {
             TRIANGLE.replace(" 0 0\n", " \\\n0 0\n"),
             TRIANGLE.replace(" 0 0\n", "\\ \t\x0b\x0c\r\n0\\\r0\r\n"),
             TRIANGLE.trim_end().into(),
-            // A name may end as a line that goes on does.
+            // A name may end with a `\`.
             format!("usemtl mats\\\n{TRIANGLE}"),
             format!("usemtl C:\\mats\\ \r\n{TRIANGLE}o \\"),
             TRIANGLE.replace("\nv", "\\\nv"),
@@ -631,11 +634,11 @@ mod tests {
                 false => assert_eq!(read(text.as_bytes()), plain, "{face}"),
             }
         }
-        // A face with a corner that has no place gets its places made up.
+        // A face with a corner without texture coordinates gets projected coordinates.
         let mixed = TRIANGLE.replace("3/3", "3").replace("vt 1 0", "vt nan");
         let (_, _, corners) = read(mixed.as_bytes());
         assert!(corners.iter().all(|corner| corner.place.is_none()));
-        // Behind the numbers that count anything may stand.
+        // Anything may follow the numbers that count.
         let behind = TRIANGLE.replace("v 1 0 0", "v 1 0 0 1.#J nan");
         let behind = behind.replace("vt 1 0", "vt 1 0 -nan(ind)");
         assert_eq!(read(behind.as_bytes()), plain);
@@ -743,7 +746,7 @@ mod tests {
                 "1 come before this line",
             ),
             ("\nf 1 1\\\n 1 \\", 2, "the file ends here"),
-            // No faces: the first line that is none of an OBJ's.
+            // No faces: the error names the first line that does not belong in an OBJ.
             (
                 "# a\nhello\nworld",
                 2,

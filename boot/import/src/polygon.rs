@@ -1,15 +1,15 @@
 //! From an OBJ's faces to polygons on the mesh's grid.
 //!
-//! The model is centred and scaled so that a ball of [`RADIUS`] contains it: at the default distance it
-//! fits the screen in every orientation. Then its points are rounded to the mesh's grid, and equal points
-//! become one vertex. Every later decision is made on the grid, because the kernel sees nothing else.
+//! The model is centred and scaled so that a ball of [`RADIUS`] contains it: at the default distance it fits
+//! the screen in every orientation. Then its points are rounded to the mesh's grid, and equal points become
+//! one vertex. Every later decision is made on the grid, because the kernel sees nothing else.
 //!
 //! # Missing texture coordinates
 //!
-//! A face without texture coordinates gets them by projection onto a box around the model's centre. The largest
-//! of its normal's three parts says which side of the box the face is on, and each side has the whole texture
-//! once. Such a face always has one texture plane and no seam, and the projection stretches by at most the square root
-//! of three.
+//! A face without texture coordinates gets them by projection onto a box around the model's centre. The
+//! largest component of the face's normal says which side of the box the face is on, and each side has the
+//! whole texture once. Such a face always has one texture plane and no seam, and the projection stretches
+//! the texture by at most the square root of three.
 
 use std::collections::HashMap;
 
@@ -19,29 +19,30 @@ use scene::{MAX_FACES, MAX_VERTICES, Vec3};
 use crate::obj::{BadLine, Obj, SIMPLIFY};
 use crate::vector::{cross, length, minus};
 
-/// Of the ball that holds the model, in units. From the default distance of 2.95 units its outline
-/// is 115 pixels from the screen's middle, of the 120 to the edge.
+/// The radius of the ball that contains the model, in units. From the default distance of 2.95 units, the
+/// ball's outline is 115 pixels from the screen's centre, of the 120 to the edge.
 pub const RADIUS: f64 = 1.2;
 /// One unit on the mesh's grid.
 pub(crate) const GRID: f64 = 65_536.0;
 
-/// What became of the file's faces.
+/// What happened to the file's faces.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Without an area: dropped.
+    /// Faces without an area, which were dropped.
     pub degenerate: usize,
-    /// Not convex, not flat, of too many corners or of no one texture plane: cut into triangles.
+    /// Faces that were cut into triangles, because they are not convex, not flat, have too many corners or
+    /// have no single texture plane.
     pub cut: usize,
-    /// Without texture coordinates: made up.
+    /// Faces without texture coordinates, which got projected coordinates.
     pub projected: usize,
 }
 
-/// A polygon on the grid, clockwise as it is seen from its front, and with an area.
+/// A polygon on the grid, with an area, clockwise when seen from its front.
 #[derive(Clone, Debug)]
 pub struct Polygon {
     pub(crate) ring: Vec<Place>,
     pub(crate) normal: [f64; 3],
-    /// The line of the file that it is on.
+    /// The line of the face in the file.
     pub line: usize,
 }
 
@@ -49,19 +50,20 @@ pub struct Polygon {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place {
     pub(crate) vertex: usize,
-    /// On the mesh's grid.
+    /// The position on the mesh's grid.
     pub(crate) at: [f64; 3],
-    /// In whole textures, to the right and down.
+    /// The position in the texture, in whole textures, to the right and down.
     uv: [f64; 2],
 }
 
 impl Polygon {
-    /// Where its corners are in the texture, in whole textures: to the right, or down.
+    /// Returns the corners' positions in the texture along an axis, in whole textures: to the right (0) or
+    /// down (1).
     pub fn along(&self, axis: usize) -> impl Iterator<Item = f64> {
         self.ring.iter().map(move |place| place.uv[axis])
     }
 
-    /// Makes up its texture coordinates.
+    /// Sets texture coordinates by projection onto a box.
     fn project(&mut self) {
         let side = (0..3).fold(0, |a, b| {
             if self.normal[b].abs() > self.normal[a].abs() {
@@ -70,8 +72,8 @@ impl Polygon {
                 a
             }
         });
-        // What is to the right and down on that side of the box as one looks at it from outside:
-        // the top and the bottom with the front's edge nearest.
+        // The directions to the right and down on that side of the box, when seen from outside. The top and
+        // the bottom are seen with the front's edge nearest.
         let outward = self.normal[side].signum();
         let (across, down, turned) = match side {
             0 => (2, 1, outward),
@@ -92,16 +94,16 @@ impl Polygon {
 #[derive(Clone, Debug, Default)]
 pub struct Polygons {
     pub(crate) vertices: Vec<Vec3>,
-    /// Those with an area.
+    /// The polygons that have an area.
     pub polygons: Vec<Polygon>,
     pub(crate) tally: Tally,
 }
 
 impl Polygons {
-    /// Puts an OBJ's faces on the grid, the model centred and scaled to fit.
+    /// Puts an OBJ's faces on the grid, with the model centred and scaled to fit.
     ///
     /// # Errors
-    /// No face with an area, or more vertices than a mesh may have.
+    /// If no face has an area, or there are more vertices or faces than a mesh may have.
     pub fn new(obj: &Obj) -> anyhow::Result<Self> {
         ensure!(
             !obj.faces.is_empty(),
@@ -122,8 +124,8 @@ impl Polygons {
         let from_centre = |position: [f64; 3]| [0, 1, 2].map(|k| position[k] - centre[k]);
         let lengths = used.iter().map(|&position| length(from_centre(position)));
         let scale = RADIUS * GRID / lengths.fold(0.0, f64::max);
-        // y up and z towards the viewer become y down and z away: half a turn about x. A model
-        // without an extent is all in one place.
+        // From y up and z towards the viewer to y down and z away: half a turn about x. All points of a
+        // model without an extent go to the centre.
         let on_grid = |position| {
             let [x, y, z] =
                 from_centre(position).map(|k| if scale.is_finite() { k * scale } else { 0.0 });
@@ -147,7 +149,7 @@ impl Polygons {
                     Place {
                         vertex,
                         at: point.map(f64::from),
-                        // v is up in the file.
+                        // v points up in the file.
                         uv: corner.place.map_or([f64::NAN; 2], |place| {
                             let [u, v] = obj.places[place as usize];
                             [u, -v]
@@ -201,10 +203,10 @@ impl Polygons {
     }
 }
 
-/// The unit normal on the side from which the ring is clockwise; none if it has no area.
+/// Returns the unit normal on the side from which the ring is clockwise, or `None` if the ring has no area.
 fn normal(ring: &[Place]) -> Option<[f64; 3]> {
     let mut sum = [0.0; 3];
-    // From the first corner, so that the terms are as small as the polygon is.
+    // Relative to the first corner, so that the terms are as small as the polygon.
     for pair in ring.windows(2).skip(1) {
         let term = cross(minus(pair[1].at, ring[0].at), minus(pair[0].at, ring[0].at));
         sum = [0, 1, 2].map(|k| sum[k] + term[k]);

@@ -1,4 +1,4 @@
-//! From a PNG to opaque pixels.
+//! Reads a PNG as opaque pixels.
 
 use std::io::{BufRead, Seek};
 
@@ -10,30 +10,30 @@ use system::quote::quoted;
 
 use crate::kind;
 
-/// How every PNG begins.
+/// The first bytes of every PNG.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
-/// Longest side of a PNG that is read, in pixels: its pixels take up to a quarter of a GiB.
+/// The longest side of a PNG that is read, in pixels. The pixels of the largest PNG need a quarter of a GiB.
 pub const MAX_PIXELS: u32 = 8192;
-/// The colour beneath a picture's transparent parts. Black writing and white writing without a
-/// ground both stay readable on grey.
+/// The colour beneath an image's transparent parts. Black and white text without a background both stay
+/// readable on grey.
 pub const GROUND: [u8; 3] = [128; 3];
-/// A picture, opaque.
+/// An opaque image.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Picture {
-    /// Its pixels, laid over [`GROUND`] where they are transparent.
+    /// The pixels, blended over [`GROUND`] where they are transparent.
     pub pixels: RgbImage,
-    /// Some of it was transparent.
+    /// Whether a part of the image was transparent.
     pub transparent: bool,
 }
 
-/// Reads a PNG of any kind: of an animated one the picture that programs show which know of no
-/// animation.
+/// Reads a PNG of any kind. Of an animated PNG, it reads the image that programs without support for
+/// animation show.
 ///
-/// Each pixel is laid over [`GROUND`], as far as it is transparent, before anything else is done to
-/// it. So colours that hide under full transparency reach neither the scaled texture nor its palette.
+/// Each pixel is first blended over [`GROUND`] by its transparency. So colours that hide under full
+/// transparency reach neither the scaled texture nor its palette.
 ///
 /// # Errors
-/// Another format, by name; a damaged PNG; one that is larger than [`MAX_PIXELS`].
+/// If the file has another format, which the message names, is damaged, or is larger than [`MAX_PIXELS`].
 pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
     let begin = from.fill_buf().context("it cannot be read")?;
     if !begin.starts_with(PNG) {
@@ -44,7 +44,7 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
         }
     }
     let damaged = |error| match error {
-        // This limit is on what the file says beside its pixels.
+        // This limit applies to the file's metadata, not to its pixels.
         png::DecodingError::LimitsExceeded => {
             anyhow!("its header or its notes ask for too much memory; save it again, without notes")
         }
@@ -54,7 +54,7 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
     decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    // The size first: decoding takes the memory that the header asks for.
+    // The size comes first, because decoding allocates the memory that the header asks for.
     let header = decoder.read_header_info().map_err(damaged)?;
     let (width, height) = (header.width, header.height);
     ensure!(
@@ -64,8 +64,8 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
     );
     let mut reader = decoder.read_info().map_err(damaged)?;
     let info = reader.info();
-    // The decoder refuses more than 768 bytes, and panics where a colour is cut (png 0.18.1,
-    // `create_rgba_palette`).
+    // The decoder refuses a palette of more than 768 bytes, and panics if the palette ends within a colour
+    // (png 0.18.1, `create_rgba_palette`).
     let bytes = info.palette.as_deref().unwrap_or_default().len();
     ensure!(
         bytes.is_multiple_of(3),
@@ -81,7 +81,7 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
     Ok(over_ground(bytes, frame.color_type, (width, height)))
 }
 
-/// Lays a decoder's pixels, 8 bits a part, over [`GROUND`].
+/// Blends a decoder's pixels, with 8 bits a component, over [`GROUND`].
 fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32)) -> Picture {
     let pixels = width as usize * height as usize;
     let samples = colour.samples();
@@ -106,7 +106,7 @@ fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32
         let rgb = bytes.chunks_exact(samples).flat_map(&mut pixel).collect();
         bytes = rgb;
     } else {
-        // In place: of the largest picture a copy is a fifth of a GiB.
+        // In place, because a copy of the largest image would need a fifth of a GiB.
         for i in 0..pixels {
             let rgb = pixel(&bytes[i * samples..][..samples]);
             bytes[3 * i..][..3].copy_from_slice(&rgb);
@@ -126,7 +126,7 @@ mod tests {
 
     use super::*;
 
-    /// A PNG of rows of bytes.
+    /// Returns a PNG of rows of bytes.
     fn encoded(
         (width, height): (u32, u32),
         colour: ColorType,
@@ -208,7 +208,7 @@ mod tests {
                 "{colour:?} {depth:?}"
             );
         }
-        // In seven passes: see `at`.
+        // Interlaced, in seven passes. `at` defines the pixels.
         let interlaced: Vec<u8> = INTERLACED
             .as_bytes()
             .chunks(2)
@@ -218,7 +218,7 @@ mod tests {
         let all = (0..8).flat_map(|y| (0..8).map(move |x| at(x, y)));
         let all: Vec<_> = all.flatten().collect();
         assert_eq!(picture(&interlaced), (all, false));
-        // Animated: the first picture.
+        // Animated: the first image counts.
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
         encoder.set_color(Rgb);
@@ -235,7 +235,7 @@ mod tests {
         use BitDepth::{Eight, Sixteen, Two};
         use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
         let [ground, ..] = GROUND;
-        // Half of 255 and half of the ground.
+        // 128/255 of white, and the rest of the ground.
         let half = ((255 * 128 + u32::from(ground) * 127 + 127) / 255) as u8;
         let clear: &[u8] = &[ground; 3];
         type Case<'a> = (ColorType, BitDepth, &'a [u8], &'a [u8], Vec<u8>);
@@ -261,7 +261,7 @@ mod tests {
                 &[9, 0, 255, 128, 7, 255],
                 [clear, &[half; 3], &[7; 3]].concat(),
             ),
-            // Keys. One of 16 bits is one colour, and not all with its upper halves.
+            // Transparent colours. A 16-bit key is one colour, not every colour with the same upper bytes.
             (
                 Grayscale,
                 Two,
@@ -307,7 +307,7 @@ mod tests {
                 "{colour:?} {depth:?}"
             );
         }
-        // The scaler and the quantizer see one colour, whatever hid there.
+        // The scaler and the quantizer see one colour, whatever was hidden.
         let hidden: Vec<u8> = (0..300u32 * 300)
             .flat_map(|i| [i as u8, (i >> 8) as u8, 255, 0])
             .collect();

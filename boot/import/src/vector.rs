@@ -1,4 +1,4 @@
-//! Vectors of three parts.
+//! Vectors with three components.
 
 pub fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| a[k] - b[k])

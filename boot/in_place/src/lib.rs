@@ -1,20 +1,20 @@
 //! Large values on the heap that never pass over the stack.
 //!
-//! `Box::new(Large::new())` builds its argument on the stack unless the compiler optimises that away,
-//! and a thread has 2 MiB of stack or less. [`boxed!`] copies an empty value from a static into memory
-//! of the heap in one piece.
+//! `Box::new(Large::new())` builds its argument on the stack unless the compiler optimises that away, and a
+//! thread has 2 MiB of stack or less. [`boxed!`] copies an empty value from a static to the heap in one
+//! piece.
 #![forbid(unsafe_code)]
 
 use std::ops::{Deref, DerefMut};
 use std::slice;
-/// For [`boxed!`], which is used in crates without `std` as well.
+/// For [`boxed!`], which crates without `std` use as well.
 #[doc(hidden)]
 pub use std::sync::Mutex;
 
 /// A value on the heap.
 ///
-/// It is a slice of one element: only slices can be copied into a box without a detour over the stack
-/// and without unsafe code.
+/// It is a slice of one element: only slices can be copied into a box without unsafe code and without a
+/// detour over the stack.
 #[derive(Clone, Debug)]
 pub struct InPlace<T>(Box<[T]>);
 
@@ -41,13 +41,13 @@ impl<T> DerefMut for InPlace<T> {
 
 /// Returns an [`InPlace`] with the value of `TYPE::new()`, which must be a constant.
 ///
-/// The value that is copied stands in a static behind a lock, so that one of zeros takes no room in the
+/// The source of the copy is a static behind a lock, so that a value of zeros needs no space in the
 /// program's file.
 #[macro_export]
 macro_rules! boxed {
     ($of:ty) => {{
         static EMPTY: $crate::Mutex<$of> = $crate::Mutex::new(<$of>::new());
-        // Nothing but the copy happens under the lock, so nothing can poison it.
+        // Only the copy happens under the lock, so nothing can poison it.
         $crate::InPlace::copy_of(&*EMPTY.lock().unwrap())
     }};
 }

@@ -1,8 +1,9 @@
-//! Debian's packages, fetched and unpacked into the cache: no root, and nothing on the system changes.
+//! Downloads Debian packages and unpacks them into the cache, without root and without a change to the
+//! system.
 //!
-//! apt-get decides what a package needs. It plans as if the system were empty, because a plan for the real
-//! system may fail or remove packages; what the system already has is then left out. apt-get never installs
-//! anything here: it lists, and it downloads.
+//! apt-get decides which packages a package needs. It plans as if the system were empty, because a plan for
+//! the real system may fail or remove packages. The packages that the system already has are then left out.
+//! Here apt-get only lists and downloads; it never installs.
 
 use std::collections::HashSet;
 use std::fmt::{self, Display, Formatter};
@@ -20,14 +21,15 @@ use super::sha256::sha256;
 use system::{Interrupted, child};
 use system::{Step, bytes};
 
-/// The list of a folder's packages, in apt-get's words. It is written when all of them are there.
+/// The file that lists a folder's packages, in apt-get's format. It is written after all packages have
+/// arrived.
 const LIST: &str = "list";
 
-/// The machine's name in Debian's and Rust's paths alike.
+/// The machine's name, the same in Debian's and in Rust's paths.
 pub const MACHINE: &str = std::env::consts::ARCH;
 
-/// What apt-get does not do for us: the system's hooks, which change the system's caches when root runs them,
-/// and indexes that nothing here reads.
+/// Settings that turn off two parts of apt-get: the system's hooks, which change the system's caches when
+/// root runs them, and indexes that this program does not read.
 const CONFIGURATION: &str = r#"
 #clear APT::Update::Pre-Invoke;
 #clear APT::Update::Post-Invoke;
@@ -41,28 +43,28 @@ Acquire::IndexTargets::deb::CNF::DefaultEnabled "false";
 Acquire::IndexTargets::deb-src::Sources::DefaultEnabled "false";
 "#;
 
-/// What is wanted of the archive.
+/// A request for packages.
 #[derive(Debug, Clone, Copy)]
 pub struct Wanted<'a> {
-    /// What the packages are, for messages: `Rust 1.96.0`.
+    /// The name of the software in messages, such as `Rust 1.96.0`.
     pub what: &'a str,
-    /// Packages without what they depend on.
+    /// Packages to fetch without their dependencies.
     pub alone: &'a [&'a str],
-    /// Packages with all that they depend on and this system does not have in the same version.
+    /// Packages to fetch with every dependency that this system does not have in the same version.
     pub whole: &'a [&'a str],
-    /// Packages whose names begin so are fetched even where the system has them.
+    /// Prefixes of package names. Packages with such a name are fetched even if the system has them.
     pub own: &'a [&'a str],
-    /// Packages that are left out even where the system has another version.
+    /// Packages to leave out even if the system has another version.
     pub never: &'a [&'a str],
-    /// A suite of Debian to take them from, such as `bookworm-backports`; else the system's.
+    /// The suite of Debian to fetch from, such as `bookworm-backports`, or `None` for the system's suites.
     pub suite: Option<&'a str>,
-    /// Says why a package will not do.
+    /// Returns an error that says why a package is not suitable.
     pub check: fn(&Package) -> anyhow::Result<()>,
-    /// The bytes on the disk that are needed for `bytes` of packages.
+    /// Returns the bytes of disk space needed to unpack `bytes` of packages; the download is not included.
     pub room: fn(bytes: u64) -> u64,
 }
 
-/// A package as `apt-get --print-uris download` lists it.
+/// A package, as `apt-get --print-uris download` lists it.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Package {
     file: String,
@@ -71,7 +73,7 @@ pub struct Package {
 }
 
 impl Package {
-    /// Reads `'URI' FILE BYTES SHA256:HASH`.
+    /// Parses `'URI' FILE BYTES SHA256:HASH`.
     fn parse(line: &str) -> Option<Self> {
         let mut words = line.strip_prefix('\'')?.split_once("' ")?.1.split(' ');
         let (file, bytes) = (words.next()?.to_owned(), words.next()?.parse().ok()?);
@@ -87,17 +89,17 @@ impl Package {
         text.lines().filter_map(Self::parse).collect()
     }
 
-    /// The package's name.
+    /// Returns the package's name.
     pub fn name(&self) -> &str {
         self.file.split('_').next().unwrap_or_default()
     }
 
-    /// The package's version, as its file name has it.
+    /// Returns the package's version, as its file name spells it.
     pub fn version(&self) -> &str {
         self.file.split('_').nth(1).unwrap_or_default()
     }
 
-    /// One of which only the file's name counts.
+    /// Returns a package with only a file name, for tests.
     #[cfg(test)]
     pub fn of_file(file: &str) -> Self {
         Self {
@@ -107,7 +109,7 @@ impl Package {
         }
     }
 
-    /// Whether a folder has it, whole and unchanged.
+    /// Returns whether `folder` has the package, complete and unchanged.
     fn is_in(&self, folder: &Path) -> bool {
         fs::read(folder.join(&self.file)).is_ok_and(|data| sha256(&data) == self.sha256)
     }
@@ -119,7 +121,7 @@ impl Display for Package {
     }
 }
 
-/// Whether this system has what is needed here.
+/// Returns whether this system has the Debian programs that this module runs.
 pub fn is_here() -> bool {
     ["apt-get", "dpkg", "dpkg-query"]
         .map(which::which)
@@ -127,18 +129,18 @@ pub fn is_here() -> bool {
         .all(Result::is_ok)
 }
 
-/// The packages that an earlier [`fetch`] put into `folder`, if all are there and unchanged.
+/// Returns the packages that an earlier [`fetch`] put into `folder`, if all of them exist and are unchanged.
 pub fn kept(folder: &Path) -> Option<Vec<Package>> {
     let list = Package::parse_all(&fs::read_to_string(folder.join(LIST)).ok()?);
     let whole = !list.is_empty() && missing(&list, folder).is_empty();
     whole.then_some(list)
 }
 
-/// Fetches packages into `folder`: by the system's package lists, or, where those are missing or old, by lists
-/// of our own.
+/// Fetches packages into `folder`, by the system's package lists, or by private lists if the system's are
+/// missing or old.
 ///
 /// # Errors
-/// When the archive does not have what is wanted, or does not deliver it whole.
+/// If cargo is offline, this is no Debian system, the archive lacks a package, or a download is incomplete.
 pub fn fetch(cache: &Locked, wanted: &Wanted, folder: &Path) -> anyhow::Result<Vec<Package>> {
     if let Some(setting) = offline() {
         bail!("cargo is offline ({setting}), so nothing is downloaded");
@@ -150,7 +152,7 @@ pub fn fetch(cache: &Locked, wanted: &Wanted, folder: &Path) -> anyhow::Result<V
         let list = apt.list(cache, wanted)?;
         download(cache, apt, wanted, list, folder)
     };
-    // The system's lists know the system's suites only.
+    // The system's lists know only the system's suites.
     if wanted.suite.is_none() {
         match get(&Apt::of_system(cache)?) {
             Err(error) if !error.is::<Interrupted>() && !is_full(&error) => {}
@@ -162,7 +164,8 @@ pub fn fetch(cache: &Locked, wanted: &Wanted, folder: &Path) -> anyhow::Result<V
         "asking Debian's archive for its package lists, which are kept apart",
         0,
     );
-    // Its exit code is that of its worst source: what counts is whether the packages are found afterwards.
+    // The exit code of `update` is that of its worst source. It matters only whether the packages are found
+    // afterwards.
     let updated = watch(apt.command().args(["--error-on=any", "update"]), step, || 0);
     match (get(&apt), updated) {
         (Err(error), Err(update)) if !error.is::<Interrupted>() && !is_full(&error) => {
@@ -172,10 +175,10 @@ pub fn fetch(cache: &Locked, wanted: &Wanted, folder: &Path) -> anyhow::Result<V
     }
 }
 
-/// Unpacks packages of `folder` into the folder `into`, everything below its `usr`.
+/// Unpacks the packages in `folder` into the folder `into`, with all programs and libraries below its `usr`.
 ///
 /// # Errors
-/// When dpkg fails.
+/// If dpkg is missing or fails.
 pub fn unpack(what: &str, packages: &[Package], folder: &Path, into: &Path) -> anyhow::Result<()> {
     let dpkg = which::which("dpkg").context("this is no Debian system (no dpkg)")?;
     let total = packages.iter().map(|package| package.bytes).sum();
@@ -188,7 +191,7 @@ pub fn unpack(what: &str, packages: &[Package], folder: &Path, into: &Path) -> a
         done += package.bytes;
         step.at(done);
     }
-    // Older packages have files in `/lib` that belong to `/usr/lib`.
+    // Older packages have files in `/lib` that belong in `/usr/lib`.
     for name in ["bin", "sbin", "lib", "lib64"] {
         let from = into.join(name);
         if from.is_dir() {
@@ -198,7 +201,7 @@ pub fn unpack(what: &str, packages: &[Package], folder: &Path, into: &Path) -> a
     Ok(())
 }
 
-/// Moves all that is in the folder `from` to `to`.
+/// Moves the contents of the folder `from` to `to`, and removes `from`.
 fn merge(from: &Path, to: &Path) -> anyhow::Result<()> {
     fs::create_dir_all(to)?;
     for entry in fs::read_dir(from)? {
@@ -213,19 +216,19 @@ fn merge(from: &Path, to: &Path) -> anyhow::Result<()> {
     cache::remove(from)
 }
 
-/// Runs a command as a step.
+/// Runs a command and shows its progress.
 fn watch(command: &mut Command, mut step: Step, done: impl Fn() -> u64) -> anyhow::Result<String> {
     child::watch(command, |event| step.on(event, &done))
 }
 
-/// The packages of a list that are not in `folder` yet.
+/// Returns the packages of a list that are not yet in `folder`.
 fn missing<'a>(list: &'a [Package], folder: &Path) -> Vec<&'a Package> {
     list.iter()
         .filter(|package| !package.is_in(folder))
         .collect()
 }
 
-/// Downloads what is not in `folder` yet, and notes there what it has.
+/// Downloads the packages that are not yet in `folder`, and writes the folder's list.
 fn download(
     cache: &Locked,
     apt: &Apt,
@@ -255,7 +258,7 @@ fn download(
             .current_dir(aside.path());
         let got = watch(&mut get, step, || cache::size(aside.path()));
         fs::create_dir_all(folder)?;
-        // Also after a failure: what is whole need not be fetched again.
+        // Even after a failure, so that complete packages need not be fetched again.
         for package in missing.iter().filter(|package| package.is_in(aside.path())) {
             fs::rename(aside.path().join(&package.file), folder.join(&package.file))?;
         }
@@ -271,9 +274,9 @@ fn download(
     Ok(list)
 }
 
-/// apt-get, with the system's package lists or with lists of our own.
+/// apt-get, with the system's package lists or with private lists.
 struct Apt<'a> {
-    /// The configuration, and our own lists.
+    /// The folder of the configuration and the private lists.
     folder: TempDir,
     own_lists: bool,
     suite: Option<&'a str>,
@@ -295,7 +298,7 @@ impl<'a> Apt<'a> {
             own_lists: true,
             ..Self::of_system(cache)?
         };
-        // apt-get makes neither.
+        // apt-get does not create these folders.
         for folder in ["lists/partial", "cache/archives/partial"] {
             fs::create_dir_all(apt.folder.path().join(folder))?;
         }
@@ -306,9 +309,9 @@ impl<'a> Apt<'a> {
         Ok(apt)
     }
 
-    /// Makes a folder of sources: the system's, and this suite of the same archive.
+    /// Makes a folder of sources: the system's sources, and this suite of the same archive.
     fn add_source(&self, suite: &str) -> anyhow::Result<()> {
-        // apt-get lists what it would fetch: `'http://HOST/debian/dists/bookworm/InRelease' ...`.
+        // apt-get prints the URIs that it would fetch: `'http://HOST/debian/dists/bookworm/InRelease' ...`.
         let mut ask = self.command();
         let known = child::run(ask.args(["--print-uris", "update"]))?;
         let archive = known
@@ -333,13 +336,14 @@ impl<'a> Apt<'a> {
     fn command(&self) -> Command {
         let mut command = child::family("apt-get");
         let folder = self.folder.path();
-        // As root apt-get would download as another user, who cannot write to the cache, and warn about it.
+        // Run by root, apt-get would download as another user, who cannot write to the cache, and print a
+        // warning.
         command
             .env("LC_ALL", "C")
             .args(["-q", "-o", "APT::Sandbox::User=root", "-c"])
             .arg(folder.join("apt.conf"));
         if !self.own_lists {
-            // As root apt-get would rewrite its own index of the system's lists.
+            // Run by root, apt-get would rewrite the system's index of its lists.
             for index in ["pkgcache", "srcpkgcache"] {
                 command.args(["-o", &format!("Dir::Cache::{index}=")]);
             }
@@ -361,10 +365,11 @@ impl<'a> Apt<'a> {
         command
     }
 
-    /// The packages that are wanted, as far as this system does not have them.
+    /// Returns the packages to fetch: the requested packages that this system lacks, and their dependencies.
     fn list(&self, cache: &Locked, wanted: &Wanted) -> anyhow::Result<Vec<Package>> {
         let alone = wanted.alone.iter().copied().map(str::to_owned);
-        // Asked for alone: apt-get finds nothing at all if one name holds a version that the archive lacks.
+        // Ask about the first package alone. Its name holds no version, so the archive knows it, and `check`
+        // can report its version. With a name whose version the archive lacks, apt-get would list nothing.
         if let Some(first) = wanted.alone.first() {
             let first = [(*first).to_owned()];
             self.uris(cache, &first)?
@@ -383,9 +388,9 @@ impl<'a> Apt<'a> {
         }
     }
 
-    /// What the archive has for these names.
+    /// Returns the archive's packages with these names.
     fn uris(&self, cache: &Locked, names: &[String]) -> anyhow::Result<Vec<Package>> {
-        // In an empty folder: it does not list what is there already.
+        // In an empty folder, because apt-get does not list files that the current folder already has.
         let empty = cache.aside()?;
         let mut command = self.command();
         command
@@ -395,7 +400,8 @@ impl<'a> Apt<'a> {
         child::run(&mut command).map(|text| Package::parse_all(&text))
     }
 
-    /// The names of the packages that are wanted whole, and of all that they need, without what the system has.
+    /// Returns the names of `wanted.whole` and of all their dependencies, without the packages that the
+    /// system has.
     fn needed(&self, wanted: &Wanted) -> anyhow::Result<Vec<String>> {
         let mut plan = self.command();
         plan.args(["-o", "Dir::State::status=/dev/null"]);
@@ -412,7 +418,7 @@ impl<'a> Apt<'a> {
     }
 }
 
-/// The names in a plan of apt-get's, without those of dpkg's list of what is here.
+/// Returns the names in apt-get's plan that dpkg's list of the system, `here`, lacks.
 fn lacking(plan: &str, here: &str, wanted: &Wanted) -> Vec<String> {
     let here: HashSet<_> = here
         .lines()
@@ -428,7 +434,7 @@ fn lacking(plan: &str, here: &str, wanted: &Wanted) -> Vec<String> {
     files
         .filter_map(|file| {
             let name = file.split('_').next()?;
-            // A file name cannot have the epoch's colon.
+            // apt-get escapes the colon of the version's epoch in file names.
             let package = file.strip_suffix(".deb")?.replace("%3a", ":");
             let own = wanted.own.iter().any(|prefix| name.starts_with(prefix));
             let lacks = own || !here.contains(package.as_str());

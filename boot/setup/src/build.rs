@@ -1,7 +1,9 @@
-//! The nested cargo builds: the kernel, the program that makes the image, and the image.
+//! The nested cargo builds of the kernel and of the program that makes the image, and the making of the
+//! image.
 //!
-//! A cargo inside a cargo needs a target folder of its own, because the outer cargo holds the lock of its target
-//! folder. The user's flags, profiles and wrappers do not reach these builds: see [settings](super::settings).
+//! A nested cargo needs a separate target folder, because the outer cargo holds the lock of its own target
+//! folder. The user's flags, profiles and wrappers do not reach these builds: see
+//! [settings](super::settings).
 
 use std::env;
 use std::ffi::OsString;
@@ -20,27 +22,27 @@ use super::toolchain::Toolchain;
 use system::Step;
 use system::child::{self, Event};
 
-/// The kernel's cargo home, in the cache.
+/// The folder in the cache that is the cargo home of the kernel's build.
 const CARGO_HOME: &str = "cargo";
 
 const PACKAGE: &str = "crystal-ball-kernel";
 const TARGET: &str = "x86_64-unknown-none";
 const IMAGE_MAKER: &str = "crystal-ball-image";
 
-/// Is part of the image maker's name in the cache: to be changed when the way of building it changes.
+/// Part of the hash in the image maker's name. Change it when the way to build the image maker changes.
 const WAY: &[u8] = b"2: without the user's settings";
 
-/// A program of the bare machine, with an image of its own.
+/// A program for the bare machine. Each program has a separate image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Program {
-    /// The show.
+    /// The demo.
     Show,
-    /// The one that measures.
+    /// The benchmark kernel.
     Measure,
 }
 
 impl Program {
-    /// The binary in the kernel's package.
+    /// Returns the name of the binary in the kernel's package.
     fn binary(self) -> &'static str {
         match self {
             Self::Show => "crystal-ball-kernel",
@@ -48,7 +50,7 @@ impl Program {
         }
     }
 
-    /// The image's file.
+    /// Returns the file name of the image.
     fn image(self) -> &'static str {
         match self {
             Self::Show => "crystal-ball.img",
@@ -57,7 +59,7 @@ impl Program {
     }
 }
 
-/// The workspace's root.
+/// Returns the workspace's root.
 pub fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .ancestors()
@@ -65,9 +67,10 @@ pub fn root() -> &'static Path {
         .expect("the crate is two folders below the root")
 }
 
-/// The workspace's target folder: the one this very program was built in.
+/// Returns the workspace's target folder: the folder in which this program was built.
 fn target() -> PathBuf {
-    // Cargo does not tell it at run time when a configuration file or an option chose it.
+    // The search starts at this program's path, because cargo does not pass on a target folder that a
+    // configuration file or an option chose.
     let program = env::current_exe().unwrap_or_default();
     let built_in = program
         .ancestors()
@@ -79,12 +82,12 @@ fn target() -> PathBuf {
         .unwrap_or_else(|| root().join("target"))
 }
 
-/// Where the kernel is built, and where the image is.
+/// Returns the folder in which the kernel is built, and the folder of the image.
 pub fn folders() -> [PathBuf; 2] {
     [target().join("kernel"), target().join("crystal-ball")]
 }
 
-/// A program's kernel and image in this workspace, whether or not they exist.
+/// Returns the paths of a program's kernel and image in this workspace, whether or not they exist.
 pub fn files(program: Program) -> [PathBuf; 2] {
     let [kernel, image] = folders();
     [
@@ -93,10 +96,10 @@ pub fn files(program: Program) -> [PathBuf; 2] {
     ]
 }
 
-/// Builds a program's kernel.
+/// Builds a program's kernel, and returns its path.
 pub fn kernel(cache: &Locked, toolchain: &Toolchain, program: Program) -> anyhow::Result<PathBuf> {
     let folder = neutral(cache)?;
-    // Cargo builds again what lies at another path: the home stays.
+    // The home must stay at one path: cargo rebuilds packages that it finds at another path.
     let mut cargo = cargo(toolchain, &cache.path(CARGO_HOME), folder.path())?;
     cargo.args(["build", "--manifest-path"]);
     cargo.arg(root().join("Cargo.toml")).args([
@@ -125,7 +128,8 @@ pub fn kernel(cache: &Locked, toolchain: &Toolchain, program: Program) -> anyhow
     Ok(kernel)
 }
 
-/// The program that makes images, for this compiler: from the cache, or built (by far the longest step).
+/// Returns the image maker for this compiler, from the cache or newly built. The build is by far the longest
+/// step.
 pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<PathBuf> {
     let (name, sources) = image_maker_name(toolchain)?;
     let place = cache.path(&name);
@@ -135,7 +139,7 @@ pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<Path
     cache.room(pin::BUILDS, "building the boot loader")?;
     let aside = cache.aside()?;
     let folder = neutral(cache)?;
-    // `cargo install` reads the configuration files above its home.
+    // `cargo install` reads the configuration files above its home, so the home lies in the neutral folder.
     let home = folder.path().join("home");
     let mut cargo = cargo(toolchain, &home, folder.path())?;
     cargo
@@ -165,7 +169,8 @@ pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<Path
     Ok(cache.put(&made, &name)?.join(IMAGE_MAKER))
 }
 
-/// The image maker's name in the cache, which says all that it depends on, and the folder of its sources.
+/// Returns the image maker's name in the cache, which has a hash of all that the image maker depends on, and
+/// the folder of its sources.
 pub fn image_maker_name(toolchain: &Toolchain) -> anyhow::Result<(String, PathBuf)> {
     let folder = root().join("boot/image");
     let mut all = [WAY, toolchain.version.as_bytes()].concat();
@@ -176,15 +181,17 @@ pub fn image_maker_name(toolchain: &Toolchain) -> anyhow::Result<(String, PathBu
     Ok((format!("image-{}", &sha256(&all)[..16]), folder))
 }
 
-/// Whether a kept image maker is there and unchanged.
+/// Returns whether the cached image maker in `place` exists and is unchanged.
 pub fn is_whole(place: &Path) -> bool {
     let said = fs::read_to_string(place.join("sha256"));
     fs::read(place.join(IMAGE_MAKER)).is_ok_and(|data| said.is_ok_and(|said| said == sha256(&data)))
 }
 
-/// Makes the image. Always: it takes a tenth of a second, and an image of another kernel would be worse.
+/// Makes the image, and returns its path.
 ///
-/// One with a ramdisk has a name that says which: two runs with two models may be at it at once.
+/// The image is made on every run: it takes a tenth of a second, and an image with an outdated kernel would
+/// be worse. The name of an image with a ramdisk has the ramdisk's hash, because two runs with different
+/// models may work at the same time.
 pub fn image(maker: &Path, program: Program, ramdisk: Option<&[u8]>) -> anyhow::Result<PathBuf> {
     let [kernel, mut image] = files(program);
     let [_, folder] = folders();
@@ -202,12 +209,13 @@ pub fn image(maker: &Path, program: Program, ramdisk: Option<&[u8]>) -> anyhow::
         image.set_file_name(format!("model-{}.img", &sha256(bytes)[..16]));
     }
     child::run(&mut make).context("the disk image cannot be made")?;
-    // Others may be booting the old one: they keep it, this is a new file.
+    // Another run may be booting the old image. It keeps the old file, because the rename puts a new file in
+    // its place.
     fs::rename(made, &image).with_context(|| format!("{} cannot be written", image.display()))?;
     Ok(image)
 }
 
-/// The cargo that runs us, else the one in `PATH`.
+/// Returns the cargo that runs this program, or else the cargo in `PATH`.
 pub fn cargo_path() -> anyhow::Result<PathBuf> {
     match env::var_os("CARGO") {
         Some(cargo) => Ok(cargo.into()),
@@ -217,12 +225,14 @@ pub fn cargo_path() -> anyhow::Result<PathBuf> {
     }
 }
 
-/// A folder without the user's configuration, for one build at a time: the cache is locked.
+/// Returns a folder without the user's configuration. The lock of the cache ensures that only one build uses
+/// it.
 fn neutral(cache: &Locked) -> anyhow::Result<TempDir> {
     settings::neutral(cache.folder().as_os_str())
 }
 
-/// That cargo, set up for the toolchain: it runs in `folder`, and `home` becomes its home.
+/// Returns a command that runs the cargo of [`cargo_path`] with the toolchain's compiler, in `folder`, with
+/// `home` as its cargo home.
 fn cargo(toolchain: &Toolchain, home: &Path, folder: &Path) -> anyhow::Result<Command> {
     settings::make_home(home, &env::current_dir()?, settings::home().as_deref())?;
     let mut command = child::family(cargo_path()?);
@@ -234,12 +244,12 @@ fn cargo(toolchain: &Toolchain, home: &Path, folder: &Path) -> anyhow::Result<Co
         .env("CARGO_HOME", home)
         .env("RUSTC", programs.join("rustc"))
         .env("PATH", first_in_path(&programs)?);
-    // The pinned compiler is a stable one; this lets cargo and it take `-Z` options all the same.
+    // The pinned compiler is a stable release. This variable makes it and cargo accept `-Z` options.
     command.env("RUSTC_BOOTSTRAP", "1");
     Ok(command)
 }
 
-/// The boot loader's build calls plain `rustc`.
+/// Returns `PATH` with `folder` in front, because the boot loader's build calls plain `rustc`.
 fn first_in_path(folder: &Path) -> anyhow::Result<OsString> {
     let path = env::var_os("PATH").unwrap_or_default();
     env::join_paths(
@@ -250,7 +260,7 @@ fn first_in_path(folder: &Path) -> anyhow::Result<OsString> {
     .context("the cache's path cannot stand in PATH")
 }
 
-/// Runs a build: silent when there is nothing to do, else announced, with cargo's own words.
+/// Runs a build. Without work it prints nothing; otherwise it announces `what` and shows cargo's messages.
 fn build(cargo: &mut Command, what: &str) -> anyhow::Result<()> {
     let mut step = None;
     let done = child::watch(cargo, |event| match event {

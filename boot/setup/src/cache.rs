@@ -1,7 +1,8 @@
-//! The folder in which the set-up keeps what is costly to get, for all clones of this user.
+//! The cache folder, which keeps whatever is costly to get, for all of this user's clones.
 //!
-//! One lock file orders all set-ups. Things are made in a folder aside, in the same file system, and put in
-//! place by a rename. A killed run leaves at most its folder aside, which the next holder of the lock removes.
+//! A lock file allows one set-up at a time. A new entry is made in a temporary folder in the same file
+//! system, and a rename puts it in place. A killed run leaves at most its temporary folder, which the next
+//! holder of the lock removes.
 
 use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind};
@@ -25,7 +26,7 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Where the cache is: the user's cache folder, by the XDG rules.
+    /// Returns the cache's place: a folder in the user's cache folder, by the XDG rules.
     pub fn find() -> anyhow::Result<Self> {
         let places = etcetera::base_strategy::Xdg::new().context(
             "no home folder: set HOME or XDG_CACHE_HOME to a folder that can be written",
@@ -35,7 +36,7 @@ impl Cache {
         })
     }
 
-    /// Makes the folder, waits for other set-ups, and removes what killed ones left.
+    /// Creates the folder, waits for other set-ups, and removes the temporary folders of killed runs.
     pub fn lock(self) -> anyhow::Result<Locked> {
         let unusable = || {
             format!(
@@ -57,12 +58,12 @@ impl Cache {
         })
     }
 
-    /// The path of something kept.
+    /// Returns the path of the entry `name`.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.join(name)
     }
 
-    /// The folder itself.
+    /// Returns the cache folder.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -87,12 +88,12 @@ fn wait(lock: &File, path: &Path) -> anyhow::Result<()> {
                 path.display()
             ));
         }
-        // Asked again and again, so that Ctrl-C is heard.
+        // Polling, not a blocking lock, so that Ctrl-C ends the wait.
         std::thread::sleep(Duration::from_millis(20));
     }
 }
 
-/// The cache while this process alone may change it.
+/// The locked cache: only this process may change it.
 pub struct Locked {
     cache: Cache,
     _lock: File,
@@ -107,12 +108,12 @@ impl Deref for Locked {
 }
 
 impl Locked {
-    /// A new folder to make something in.
+    /// Creates a temporary folder in the cache's file system.
     pub fn aside(&self) -> anyhow::Result<TempDir> {
         TempDir::new_in(self.path(ASIDE)).context("the cache cannot be written")
     }
 
-    /// Puts what was made aside in its place; what was there is removed.
+    /// Puts the finished `made` in its place in the cache, and removes the entry that was there.
     pub fn put(&self, made: &Path, name: &str) -> anyhow::Result<PathBuf> {
         let place = self.path(name);
         let old = self.aside()?;
@@ -124,7 +125,7 @@ impl Locked {
         Ok(place)
     }
 
-    /// Everything in the cache but the lock, which others may be waiting for.
+    /// Returns all entries of the cache but the lock file, for which other processes may be waiting.
     pub fn contents(&self) -> anyhow::Result<Vec<PathBuf>> {
         let entries = fs::read_dir(self.folder())?.collect::<Result<Vec<_>, _>>()?;
         Ok(entries
@@ -134,7 +135,7 @@ impl Locked {
             .collect())
     }
 
-    /// Says no before a download that the disk has no room for.
+    /// Returns an error if the disk has less than `needed` bytes of free space. Call it before a download.
     pub fn room(&self, needed: u64, what: &str) -> anyhow::Result<()> {
         let free = free(self.folder())?;
         if free < needed {
@@ -150,14 +151,14 @@ impl Locked {
     }
 }
 
-/// Free bytes for an ordinary user where `folder` is.
+/// Returns the free bytes, for an ordinary user, in the file system of `folder`.
 pub fn free(folder: &Path) -> anyhow::Result<u64> {
     let disk = rustix::fs::statvfs(folder)
         .with_context(|| format!("the free space of {} is unknown", folder.display()))?;
     Ok(disk.f_bavail * disk.f_frsize)
 }
 
-/// Whether an error comes from a disk that is full: then no other way to the same thing is worth a try.
+/// Returns whether a full disk caused the error. Another way to get the same files would then fail too.
 pub fn is_full(error: &anyhow::Error) -> bool {
     let by_kind = error.chain().any(|cause| {
         let kind = cause.downcast_ref().map(io::Error::kind);
@@ -167,14 +168,14 @@ pub fn is_full(error: &anyhow::Error) -> bool {
         )
     });
     let text = format!("{error:#}");
-    // What a child wrote in its error output.
+    // The text includes the error output of a child process.
     by_kind
         || ["No space left on device", "Disk quota exceeded"]
             .iter()
             .any(|words| text.contains(words))
 }
 
-/// Removes a file or a folder with all that is in it.
+/// Removes a file, or a folder with its contents.
 pub fn remove(path: &Path) -> anyhow::Result<()> {
     if path.is_dir() && !path.is_symlink() {
         fs::remove_dir_all(path)
@@ -184,7 +185,7 @@ pub fn remove(path: &Path) -> anyhow::Result<()> {
     .with_context(|| format!("{} cannot be removed", path.display()))
 }
 
-/// The bytes of all files in a folder; what cannot be read counts nothing.
+/// Returns the bytes of all files in a folder. Files that cannot be read count as 0.
 pub fn size(path: &Path) -> u64 {
     let Ok(data) = path.symlink_metadata() else {
         return 0;

@@ -1,4 +1,4 @@
-//! The ways to get a complete toolchain: the user's choice, the cache, rustup, Debian's packages.
+//! Finds or gets a complete toolchain: the user's choice, the cache's, rustup's, or Debian's packages.
 
 use std::env;
 
@@ -12,7 +12,7 @@ use super::{Options, debian, pin, rustup};
 /// Finds a toolchain without a download: the user's choice, the cache's, or rustup's.
 ///
 /// # Errors
-/// The user's choice is not complete.
+/// If the user's choice is not complete.
 pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Toolchain>> {
     let chosen = options
         .toolchain
@@ -34,10 +34,10 @@ pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Toolchain
     Ok(rustup::installed())
 }
 
-/// Finds a toolchain or gets the pinned one.
+/// Finds a toolchain, or gets the pinned toolchain.
 ///
 /// # Errors
-/// Every way failed; the message says what was tried.
+/// If every way failed. The message says what was tried.
 pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Toolchain> {
     if let Some(toolchain) = find(cache, options)? {
         return Ok(toolchain);

@@ -1,8 +1,9 @@
-//! The pinned toolchain from Debian's packages, unpacked into the cache: no root, nothing installed.
+//! The pinned toolchain from Debian's packages, unpacked into the cache, without root and without an
+//! installation.
 //!
-//! Debian's compiler finds its own library folder but not its own shared libraries when it stands elsewhere,
-//! so each program is started through a small script that says where they are. The packages are kept: the
-//! archive drops a version when the next one comes.
+//! At another place in the file system, Debian's compiler still finds its library folder, but not its shared
+//! libraries. So a small script starts each program and says where its libraries are. The cache keeps the
+//! packages, because the archive drops a version when the next version arrives.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -17,21 +18,23 @@ use super::toolchain::{self, Toolchain, VARIABLE};
 use system::say;
 use system::{Interrupted, child};
 
-/// The compiler's packages.
+/// The request for the compiler's packages.
 const WANTED: Wanted = Wanted {
     what: "Rust",
-    // Without what it depends on: `rustc-web` depends on a C compiler, and cargo cannot be here without one.
+    // Without dependencies: `rustc-web` depends on a C compiler, and a system with cargo already has a C
+    // compiler.
     alone: &pin::DEBIAN_RUST,
     whole: &pin::DEBIAN_LLVM,
     own: &pin::DEBIAN_LLVM,
-    // The scripts set `LD_LIBRARY_PATH`, which the linker inherits: another C library would break it.
+    // The scripts set `LD_LIBRARY_PATH`. The linker inherits it, and another C library would break the
+    // linker.
     never: &["libc6", "libgcc-s1", "libstdc++6"],
     suite: None,
     check,
     room: |_| pin::DEBIAN_UNPACKED + pin::BUILDS,
 };
 
-/// Makes the toolchain from packages kept or fetched.
+/// Makes the toolchain from the packages in the cache, or from newly fetched packages.
 pub fn install(cache: &Locked) -> anyhow::Result<Toolchain> {
     let folder = kept(cache);
     if let Some(packages) = apt::kept(&folder) {
@@ -51,7 +54,7 @@ pub fn install(cache: &Locked) -> anyhow::Result<Toolchain> {
     make(cache, &packages, &folder)
 }
 
-/// Unpacks the packages and puts the toolchain in its place.
+/// Unpacks the packages, and puts the toolchain in its place in the cache.
 fn make(cache: &Locked, packages: &[Package], folder: &Path) -> anyhow::Result<Toolchain> {
     cache.room(
         pin::DEBIAN_UNPACKED + pin::BUILDS,
@@ -65,7 +68,8 @@ fn make(cache: &Locked, packages: &[Package], folder: &Path) -> anyhow::Result<T
     toolchain::keep(cache, &made)
 }
 
-/// Only the compiler's own packages have the pinned version: LLVM and the libraries may have any.
+/// Checks that the compiler's own packages have the pinned version. LLVM and the libraries may have any
+/// version.
 fn check(package: &Package) -> anyhow::Result<()> {
     let (name, version) = (package.name(), package.version());
     let pinned = version
@@ -81,14 +85,14 @@ fn check(package: &Package) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The folder of the packages kept.
+/// Returns the folder of the cache that keeps the packages.
 pub fn kept(cache: &Cache) -> PathBuf {
     cache.path(&format!("packages-{}", pin::RUST))
 }
 
 /// Gives Debian's `usr` the layout of a rustup toolchain.
 fn arrange(usr: &Path) -> anyhow::Result<()> {
-    // The compiler takes 80 of 434 MB of sources: `library`, and what says which version it is.
+    // Of the 434 MB of sources, the compiler uses 80: `library`, and the files that name the version.
     let sources = usr.join("src").join(format!("rustc-{}", pin::RUST));
     for unused in ["src", "compiler"] {
         let unused = sources.join(unused);
@@ -110,14 +114,15 @@ fn arrange(usr: &Path) -> anyhow::Result<()> {
         let program = format!("{}/{program}", pin::LLVM_PROGRAMS);
         let name = format!("{programs}/{name}");
         script(usr, &name, "../../../..", &program)?;
-        // It starts only if all of its libraries are there.
+        // A program starts only if all its libraries are found.
         child::run(child::command(usr.join(&name)).args(option))?;
     }
     Ok(())
 }
 
-/// A script that starts `program` with its shared libraries. It finds both from its own place, `up` from the
-/// top, because the whole folder is renamed afterwards.
+/// Writes a script that starts `program` with its shared libraries. `up` leads from the script's folder to
+/// `usr`. The script finds `program` and the libraries relative to its own path, because the whole folder is
+/// renamed later.
 fn script(usr: &Path, name: &str, up: &str, program: &str) -> anyhow::Result<()> {
     if !usr.join(program).exists() {
         bail!("there is no {program}");

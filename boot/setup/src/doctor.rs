@@ -1,4 +1,4 @@
-//! What is there and what is missing, for people whose set-up does not do what they expect.
+//! A report of what the set-up has and what is missing, for users whose set-up does not work as expected.
 
 use std::env;
 use std::io::Write;
@@ -11,7 +11,7 @@ use super::{Options, Qemu, apt, build, compiler, debian, pin, qemu};
 use system::bytes;
 use system::child;
 
-/// Writes the report; true when nothing is missing.
+/// Writes the report, and returns whether nothing is missing.
 pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     let cache = Cache::find()?;
     let toolchain = compiler::find(&cache, options);
@@ -105,11 +105,11 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     Ok(lines.iter().all(|(_, line)| line.is_ok()))
 }
 
-/// Why a line is not well.
+/// The reason why a part is missing.
 enum Missing {
-    /// The next run sees to it: what it does.
+    /// The next run adds the part; the text says how.
     NextRun(String),
-    /// A person has to see to it: what is wrong, and the command to type.
+    /// The user must act. The text says what is wrong, and the command to type.
     ByHand(String),
 }
 
@@ -163,7 +163,7 @@ fn qemu_line(qemu: &anyhow::Result<Option<Qemu>>) -> Result<String, Missing> {
     }
 }
 
-/// What is to be done about a package of QEMU's.
+/// Returns what will provide a missing package of QEMU: the next run, or the user.
 fn fetched(package: &str) -> Result<String, Missing> {
     Err(match offline().is_none() && apt::is_here() {
         true => Missing::NextRun(format!(

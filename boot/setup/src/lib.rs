@@ -1,13 +1,14 @@
-//! The set-up that `cargo run` and `cargo test` do on first use, and nobody has to remember.
+//! The set-up that `cargo run` and `cargo test` do on first use, so that no user has to remember it.
 //!
-//! Everything a run needs and a new machine lacks: the pinned compiler with its library sources, the boot
-//! loader built by it, the kernel, the disk image, a QEMU. Plain stable cargo is all the user has, and build
-//! scripts cannot do this (a nested cargo in the same target folder waits for ever), so the host program does.
+//! It provides what a run needs and a new machine lacks: the pinned compiler with its library sources, the
+//! boot loader built by that compiler, the kernel, the disk image, and QEMU. The user needs only a stable
+//! cargo. Build scripts cannot do this work, because a nested cargo in the same target folder waits for
+//! ever, so the host program does it.
 //!
-//! It is one locked step, done by every run and by every test that boots: cargo-nextest runs each test in a
-//! process of its own, and nothing here trusts that another process has finished. Whatever is kept in the
-//! cache is made aside and renamed, so that it is whole or not there at every point where this
-//! program can be killed; what is found there is verified before use and made again when it is damaged.
+//! The set-up is one locked step. Every run does it, and so does every test that boots: cargo-nextest runs
+//! each test in a separate process, and the set-up never assumes that another process has finished. A cache
+//! entry is made in a temporary folder and renamed, so that it is complete or missing at every point at
+//! which this program can be killed. An entry is verified before use, and made again if it is damaged.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -33,46 +34,47 @@ pub use build::root;
 use cache::Cache;
 pub use qemu::Qemu;
 
-/// What the user may decide about the set-up.
+/// The user's choices about the set-up.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// A complete Rust toolchain to use in place of the pinned one; `CRYSTAL_BALL_TOOLCHAIN` says the same.
+    /// A complete Rust toolchain to use instead of the pinned one. The variable `CRYSTAL_BALL_TOOLCHAIN` has
+    /// the same effect.
     pub toolchain: Option<PathBuf>,
-    /// The QEMU to use, in place of the one in `PATH` or in the cache.
+    /// The QEMU to use, instead of the one in `PATH` or in the cache.
     pub qemu: Option<PathBuf>,
-    /// A window is wanted: a QEMU that can open one is preferred, or fetched.
+    /// Whether the user wants a window. If so, a QEMU that can open a window is preferred, or fetched.
     pub window: bool,
-    /// What the kernel is to find in its ramdisk: a pack, as a rule.
+    /// The contents of the kernel's ramdisk, usually a model file.
     pub ramdisk: Option<Vec<u8>>,
 }
 
-/// All that is needed to boot.
+/// The files and the QEMU that a boot needs.
 #[derive(Debug, Clone)]
 pub struct Ready {
     /// The bootable disk image.
     pub image: PathBuf,
-    /// The kernel in it, as an ELF file.
+    /// The kernel in the image, as an ELF file.
     pub kernel: PathBuf,
-    /// The QEMU to boot it with.
+    /// The QEMU that boots the image.
     pub qemu: Qemu,
 }
 
-/// Where this workspace's image is, and what is made beside it.
+/// Returns the folder of this workspace's images, and of the files made beside them.
 pub fn folder() -> PathBuf {
     let [_, image] = build::folders();
     image
 }
 
-/// Does the whole set-up, or what is left of it to do.
+/// Does the set-up for the demo, as far as earlier runs have not done it.
 ///
 /// # Errors
-/// When a part cannot be had: the message says what was tried, why it failed and what to do by hand.
-/// [`Interrupted`](system::Interrupted) when the user stopped it.
+/// If a part cannot be provided: the message says what was tried, why it failed and what to do by hand.
+/// [`Interrupted`](system::Interrupted) if the user stopped the program.
 pub fn ready(options: &Options) -> anyhow::Result<Ready> {
     ready_with(options, Program::Show)
 }
 
-/// The same for the program that measures, which has an image of its own.
+/// Does the set-up for the benchmark kernel, which has a separate image. See [`ready`].
 ///
 /// # Errors
 /// As [`ready`].
@@ -82,7 +84,7 @@ pub fn ready_to_measure(options: &Options) -> anyhow::Result<Ready> {
 
 fn ready_with(options: &Options, program: Program) -> anyhow::Result<Ready> {
     let cache = Cache::find()?.lock()?;
-    // First, because where there is no way to get it this fails at once, and the rest takes minutes.
+    // QEMU comes first: without a way to get it, this fails at once, and the other parts take minutes.
     let qemu = qemu::get(&cache, options)?;
     let (kernel, image) = boot_files(&cache, options, program)?;
     Ok(Ready {
@@ -92,19 +94,19 @@ fn ready_with(options: &Options, program: Program) -> anyhow::Result<Ready> {
     })
 }
 
-/// Gets the QEMU of one of Debian's suites, such as `bookworm-backports` or `sid`, without a window: from the
-/// cache, or unpacked into it. `cargo run -- qemu --suite bookworm-backports` prints its path.
+/// Returns the QEMU of a Debian suite, such as `bookworm-backports` or `sid`, without a window, from the
+/// cache or newly unpacked into it. `cargo run -- qemu --suite bookworm-backports` prints its path.
 ///
-/// This is for testing other versions than the installed one. It needs a system with apt-get and its package
-/// sources, and changes nothing on it.
+/// Use it to test versions other than the installed one. It needs a system with apt-get and its package
+/// sources, and changes nothing on that system.
 ///
 /// # Errors
-/// When the suite does not exist, or its packages cannot be had.
+/// If the suite does not exist, or its packages cannot be fetched.
 pub fn qemu_of_suite(suite: &str) -> anyhow::Result<Qemu> {
     qemu::of_suite(&Cache::find()?.lock()?, suite)
 }
 
-/// Gets the QEMU alone, which needs no image.
+/// Returns a QEMU, without an image.
 ///
 /// # Errors
 /// As [`ready`].
@@ -112,7 +114,7 @@ pub fn qemu(options: &Options) -> anyhow::Result<Qemu> {
     qemu::get(&Cache::find()?.lock()?, options)
 }
 
-/// The disk image alone, which needs no QEMU.
+/// Returns the demo's disk image, without a QEMU.
 ///
 /// # Errors
 /// As [`ready`].
@@ -125,7 +127,7 @@ fn boot_files(
     options: &Options,
     program: Program,
 ) -> anyhow::Result<(PathBuf, PathBuf)> {
-    // Without a cargo the rest would be for nothing: this is known before the downloads.
+    // Without cargo the build would fail, so check for it before the downloads.
     build::cargo_path()?;
     let toolchain = compiler::get(cache, options)?;
     let maker = build::image_maker(cache, &toolchain)?;
@@ -138,18 +140,20 @@ fn boot_files(
     Ok((kernel, image))
 }
 
-/// Tells what there is and what is missing, and installs nothing. True when a run has all it needs.
+/// Writes what the set-up has and what is missing, and installs nothing. Returns whether a run has all that
+/// it needs.
 ///
 /// # Errors
-/// When `out` cannot be written or there is no place for a cache.
+/// If `out` cannot be written, or no folder can hold the cache.
 pub fn doctor(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     doctor::report(options, out)
 }
 
-/// Removes the cache, and the kernel and image of this workspace; tells what, and returns the bytes freed.
+/// Removes the cache, and the kernel and image of this workspace. Lists what it removed, and returns the
+/// bytes freed.
 ///
 /// # Errors
-/// When something cannot be removed.
+/// If something cannot be removed.
 pub fn clean(out: &mut impl Write) -> anyhow::Result<u64> {
     let cache = Cache::find()?.lock()?;
     let mut freed = 0;

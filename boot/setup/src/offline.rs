@@ -1,21 +1,22 @@
-//! Whether the user has told cargo to stay off the network.
+//! Finds out whether the user keeps cargo off the network.
 
 use std::env;
 use std::path::Path;
 
 use super::settings;
 
-/// The environment's name of cargo's setting `net.offline`.
+/// The environment variable for cargo's setting `net.offline`.
 const OFFLINE: &str = "CARGO_NET_OFFLINE";
 
-/// Returns the setting by which the user keeps cargo off the network, if there is one.
+/// Returns the setting by which the user keeps cargo off the network, if one exists.
 pub fn offline() -> Option<String> {
     let folder = env::current_dir().unwrap_or_default();
     let home = settings::home();
     offline_by(env::var(OFFLINE).ok().as_deref(), &folder, home.as_deref())
 }
 
-/// By cargo's rules: the variable, then the files from the current folder upward, then cargo's home.
+/// Returns the setting by cargo's rules: the variable counts first, then the files from the current folder
+/// upward, then cargo's home.
 fn offline_by(variable: Option<&str>, folder: &Path, home: Option<&Path>) -> Option<String> {
     if let Some(value) = variable {
         return matches!(value, "true" | "1").then(|| OFFLINE.to_owned());
@@ -53,7 +54,7 @@ mod tests {
         assert_eq!(by(None), file("home/config.toml"));
         assert_eq!(by(Some("false")), None);
         assert_eq!(offline_by(None, &folder, None), None);
-        // A nearer file that says nothing of it, or is broken, changes nothing.
+        // A nearer file that is broken, or does not set `net.offline`, changes nothing.
         for nothing in ["net.retry = 3", "[net", "net = 1", "net.offline = 1"] {
             fs::write(at("up/.cargo/config.toml"), nothing).unwrap();
             assert_eq!(by(None), file("home/config.toml"), "{nothing}");

@@ -1,8 +1,8 @@
-//! A QEMU: the user's choice, the system's, or one unpacked into the cache.
+//! Finds a QEMU: the user's choice, the system's, or a QEMU unpacked into the cache.
 //!
-//! Nothing is ever installed on the system. Where QEMU is missing, or cannot open the window that is wanted,
-//! Debian's packages are unpacked into the cache with the libraries that the system lacks. That needs no
-//! administrator, asks nothing, and cannot conflict with what is installed.
+//! Nothing is ever installed on the system. If QEMU is missing, or cannot open a window that the user wants,
+//! Debian's packages are unpacked into the cache, with the libraries that the system lacks. That needs no
+//! administrator and no confirmation, and cannot conflict with installed packages.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -19,7 +19,7 @@ use system::{Interrupted, child};
 
 const PROGRAM: &str = "qemu-system-x86_64";
 
-/// The packages of the machine, and of the machine with a window.
+/// The package of QEMU, and the package that adds its window.
 const PACKAGES: [&str; 2] = ["qemu-system-x86", "qemu-system-gui"];
 
 /// A QEMU that starts.
@@ -27,9 +27,9 @@ const PACKAGES: [&str; 2] = ["qemu-system-x86", "qemu-system-gui"];
 pub struct Qemu {
     /// The program.
     pub path: PathBuf,
-    /// Its version, as it says it.
+    /// The version, as the program prints it.
     pub version: String,
-    /// The displays it has, by QEMU's names (`none`, `gtk`, `sdl`, ...).
+    /// The program's displays, by QEMU's names (`none`, `gtk`, `sdl`, ...).
     pub displays: Vec<String>,
 }
 
@@ -54,20 +54,21 @@ impl Qemu {
         })
     }
 
-    /// Whether it can open a window on a desktop.
+    /// Returns whether the program can open a window on a desktop.
     pub fn has_window(&self) -> bool {
         self.displays
             .iter()
             .any(|display| display == "gtk" || display == "sdl")
     }
 
-    /// Whether it has all that is asked for.
+    /// Returns whether the program has all that the options ask for.
     fn will_do(&self, options: &Options) -> bool {
         self.has_window() || !options.window
     }
 }
 
-/// Reads `-display help`: a heading, a name a line, and from some versions on an explanation after a gap.
+/// Parses the output of `-display help`: a heading, then a name on each line. Newer versions print an
+/// explanation after an empty line.
 fn displays(help: &str) -> Vec<String> {
     let names = help
         .lines()
@@ -76,11 +77,11 @@ fn displays(help: &str) -> Vec<String> {
     names.map(|line| line.trim().to_owned()).collect()
 }
 
-/// The best QEMU that exists: the user's choice, else the system's, else the cache's. One without the window
-/// that is asked for is returned only if there is no better one.
+/// Returns the best existing QEMU: the user's choice, else the system's, else the cache's. A QEMU that lacks
+/// a requested window is returned only if no better one exists.
 ///
 /// # Errors
-/// When the user's choice or the system's does not work.
+/// If the user's choice or the system's QEMU does not work.
 pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Qemu>> {
     if let Some(path) = &options.qemu {
         let found = which::which(path);
@@ -96,12 +97,13 @@ pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Qemu>> {
     Ok(better.or(system))
 }
 
-/// The folder of an unpacked QEMU in the cache: the system's suite, or another one.
+/// Returns the name of the cache folder for an unpacked QEMU, of the system's suite or of another one.
 fn folder(suite: Option<&str>) -> String {
     suite.map_or_else(|| "qemu".to_owned(), |suite| format!("qemu-{suite}"))
 }
 
-/// The QEMU that was unpacked into the cache, if it still works: it also needs libraries of the system.
+/// Returns the QEMU in the cache, if it still works. It can stop working, because it also needs libraries of
+/// the system.
 fn in_cache(cache: &Cache, suite: Option<&str>) -> anyhow::Result<Option<Qemu>> {
     let program = cache.path(&folder(suite)).join("bin").join(PROGRAM);
     if !program.exists() {
@@ -120,11 +122,11 @@ fn in_cache(cache: &Cache, suite: Option<&str>) -> anyhow::Result<Option<Qemu>> 
 /// Finds a QEMU, or unpacks one into the cache.
 ///
 /// # Errors
-/// When there is no way to get one: the message says what was tried and what to do. Being without the window
-/// that is asked for is no error.
+/// If no way to get a QEMU works: the message says what was tried and what to do. A missing window is not an
+/// error.
 pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Qemu> {
     let found = find(cache, options)?;
-    // A QEMU of the user's own choice is taken as it is.
+    // A QEMU that the user chose is used without a check for a window.
     if let Some(qemu) = &found
         && (qemu.will_do(options) || options.qemu.is_some())
     {
@@ -149,7 +151,7 @@ pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Qemu> {
     }
 }
 
-/// What a person can do about a missing package.
+/// Returns what the user can do about a missing package.
 pub fn by_hand(package: &str) -> String {
     format!(
         "Do one of these, then try again:\n\
@@ -158,11 +160,11 @@ pub fn by_hand(package: &str) -> String {
     )
 }
 
-/// The QEMU of one of Debian's suites, such as `bookworm-backports` or `sid`, without a window: from the cache,
-/// or unpacked into it. It needs a system with apt-get, and changes nothing on it.
+/// Returns the QEMU of a Debian suite, such as `bookworm-backports` or `sid`, without a window, from the
+/// cache or newly unpacked into it. This needs a system with apt-get, and changes nothing on it.
 ///
 /// # Errors
-/// When the suite does not exist or its packages cannot be had.
+/// If the suite does not exist, or its packages cannot be fetched.
 pub fn of_suite(cache: &Locked, suite: &str) -> anyhow::Result<Qemu> {
     let name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
     if !suite.starts_with(|c: char| c.is_ascii_alphanumeric()) || !suite.chars().all(name) {
@@ -185,12 +187,12 @@ fn unpack(cache: &Locked, window: bool, suite: Option<&str>) -> anyhow::Result<Q
         what,
         alone: &[],
         whole: &PACKAGES[..1 + usize::from(window)],
-        // The system's may be of another version than the program.
+        // Fetched in any case, because the system's packages may be of another version than the program.
         own: &["qemu-", "seabios", "ipxe-qemu"],
         never: &[],
         suite,
         check: |_| Ok(()),
-        // Measured: 4 times the packages, unpacked.
+        // Measured: the unpacked files take 4 times the space of the packages.
         room: |bytes| 5 * bytes,
     };
     let aside = cache.aside()?;
@@ -199,14 +201,15 @@ fn unpack(cache: &Locked, window: bool, suite: Option<&str>) -> anyhow::Result<Q
     let list = apt::fetch(cache, &wanted, &packages)?;
     apt::unpack(what, &list, &packages, &made)?;
     arrange(&made).context("Debian's packages are not laid out as expected")?;
-    // Where it is, before it takes the place of one that may be there.
+    // A check before the new QEMU replaces an older one in the cache.
     Qemu::check(made.join("bin").join(PROGRAM))?;
     let place = cache.put(&made, &folder(suite))?;
     say(format_args!("QEMU is in {}", place.display()));
     Qemu::check(place.join("bin").join(PROGRAM))
 }
 
-/// Puts a script into `bin` that starts the QEMU in `usr` with its own libraries, modules and firmware.
+/// Puts a script into `bin` that starts the QEMU in `usr` with the libraries, modules and firmware of its
+/// packages.
 fn arrange(made: &Path) -> anyhow::Result<()> {
     let libraries = format!("usr/lib/{MACHINE}-linux-gnu");
     if !made.join("usr/bin").join(PROGRAM).exists() {
@@ -219,7 +222,8 @@ fn arrange(made: &Path) -> anyhow::Result<()> {
         .map(|folder| format!("$top/{folder}"))
         .collect::<Vec<_>>()
         .join(":");
-    // The C library comes with its own loader, and works with no other.
+    // A C library works only with its own loader. If the packages have a C library, they also have its
+    // loader.
     let loader = fs::read_dir(made.join(&libraries))?
         .flatten()
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
@@ -243,7 +247,7 @@ fn arrange(made: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Collects the folders below `folder` that have shared libraries in them, as paths from `top`.
+/// Collects the folders that contain shared libraries, in `folder` and below it, as paths relative to `top`.
 fn with_libraries(top: &Path, folder: &Path, folders: &mut BTreeSet<String>) -> anyhow::Result<()> {
     for entry in fs::read_dir(top.join(folder))? {
         let entry = entry?;

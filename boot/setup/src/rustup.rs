@@ -1,6 +1,6 @@
-//! The pinned toolchain by way of rustup: one the user already has, or one of our own.
+//! The pinned toolchain from rustup: the user's, or a private download.
 //!
-//! A download goes to a private `RUSTUP_HOME`, from which only the toolchain's folder is kept: the user's own
+//! A download goes to a private `RUSTUP_HOME`, of which only the toolchain's folder is kept. The user's
 //! toolchains, default and settings stay as they are.
 
 use std::fs;
@@ -15,10 +15,11 @@ use super::toolchain::{self, Toolchain};
 use system::Step;
 use system::child;
 
-/// The user's own toolchain of the pinned version, if it is complete; used in place.
+/// Returns the user's toolchain of the pinned version, if it is complete. It stays where it is.
 pub fn installed() -> Option<Toolchain> {
     let rustup = which::which("rustup").ok()?;
-    // Newer rustups install what they are asked about, which would change the user's toolchains.
+    // Newer versions of rustup install the toolchain that `which` names, which would change the user's
+    // toolchains.
     let mut ask = child::command(rustup);
     ask.args(["which", "--toolchain", pin::RUST, "rustc"])
         .env("RUSTUP_AUTO_INSTALL", "0");

@@ -1,10 +1,10 @@
-//! What the user's cargo configuration says to the builds in here: how to reach the network, and nothing else.
+//! The user's cargo settings that reach the nested builds: how to reach the network, and nothing else.
 //!
 //! The kernel and the boot loader run on a bare machine. A `target-cpu`, a linker, a wrapper, a profile or a
-//! target folder that is right for the user's own programs breaks them. So the nested cargos get an environment
-//! with known variables only, a home folder of their own, and a current folder above which there is no
-//! configuration file. (`cargo install`, which the boot loader's build uses, looks for configuration files from
-//! cargo's home upward; `cargo build` looks from the current folder upward.)
+//! target folder that suits the user's programs breaks them. So a nested cargo gets an environment with
+//! known variables only, a private home folder, and a current folder that has no harmful configuration file
+//! in it or above it. (`cargo install`, which the boot loader's build uses, looks for configuration files
+//! from cargo's home upward; `cargo build` looks from the current folder upward.)
 
 use std::env;
 use std::ffi::{OsStr, OsString};
@@ -19,7 +19,7 @@ use toml::{Table, Value};
 
 use super::sha256::sha256;
 
-/// The tables that are carried over: sources of packages, and the ways to them.
+/// The tables that are carried over: the sources of packages, and how to reach them.
 const NETWORK: [&str; 6] = [
     "credential-alias",
     "http",
@@ -29,7 +29,7 @@ const NETWORK: [&str; 6] = [
     "source",
 ];
 
-/// More tables that do not change what a build makes.
+/// Further tables that do not change the result of a build.
 const HARMLESS: [&str; 5] = [
     "alias",
     "cache",
@@ -41,7 +41,8 @@ const HARMLESS: [&str; 5] = [
 /// How deep configuration files may include others.
 const DEPTH: usize = 8;
 
-/// What of the environment reaches a nested cargo: the user, the terminal, the network.
+/// Returns the environment variables that reach a nested cargo: those of the user, the terminal and the
+/// network.
 pub fn kept(variables: impl Iterator<Item = (OsString, OsString)>) -> Vec<(OsString, OsString)> {
     variables
         .filter(|(name, _)| is_kept(&name.to_string_lossy()))
@@ -85,7 +86,7 @@ fn is_kept(name: &str) -> bool {
         || name.to_ascii_lowercase().ends_with("_proxy")
 }
 
-/// The user's cargo home.
+/// Returns the user's cargo home.
 pub fn home() -> Option<PathBuf> {
     env::var_os("CARGO_HOME")
         .filter(|home| !home.is_empty())
@@ -93,7 +94,7 @@ pub fn home() -> Option<PathBuf> {
         .or_else(|| Some(env::home_dir()?.join(".cargo")))
 }
 
-/// The configuration files that cargo reads in `folder`, the one that counts most first.
+/// Returns the configuration files that cargo reads in `folder`, in order of decreasing priority.
 pub fn files(folder: &Path, home: Option<&Path>) -> Vec<PathBuf> {
     let mut folders: Vec<_> = folder
         .ancestors()
@@ -101,7 +102,8 @@ pub fn files(folder: &Path, home: Option<&Path>) -> Vec<PathBuf> {
         .collect();
     folders.extend(home.map(Path::to_owned));
     let mut files: Vec<PathBuf> = Vec::new();
-    // Of two in one folder cargo reads the one with the old name; the home may be above the folder, too.
+    // If a folder has both `config` and `config.toml`, cargo reads `config`. The home can itself be one of
+    // the `.cargo` folders, so a file is listed only once.
     for folder in folders {
         let names = ["config", "config.toml"].map(|name| folder.join(name));
         let file = names.into_iter().find(|file| file.is_file());
@@ -110,7 +112,8 @@ pub fn files(folder: &Path, home: Option<&Path>) -> Vec<PathBuf> {
     files
 }
 
-/// A configuration file with those it includes. A broken one is empty here: cargo itself complains about it.
+/// Reads a configuration file and the files that it includes. A broken file gives an empty table: cargo
+/// itself reports it.
 pub fn read(file: &Path) -> Table {
     read_to(file, DEPTH)
 }
@@ -135,7 +138,7 @@ fn read_to(file: &Path, depth: usize) -> Table {
     table
 }
 
-/// Makes the relative paths of the tables that are carried over absolute.
+/// Makes the relative paths in the carried-over tables absolute.
 fn make_absolute(table: &mut Table, folder: &Path) {
     let absolute = |value: Option<&mut Value>| {
         if let Some(Value::String(path)) = value {
@@ -160,7 +163,7 @@ fn make_absolute(table: &mut Table, folder: &Path) {
     }
 }
 
-/// Adds what a configuration says that counts less.
+/// Adds the settings of a configuration with lower priority.
 fn add_below(table: &mut Table, below: Table) {
     for (name, value) in below {
         match (table.get_mut(&name), value) {
@@ -168,7 +171,7 @@ fn add_below(table: &mut Table, below: Table) {
                 table.insert(name, value);
             }
             (Some(Value::Table(inner)), Value::Table(below)) => add_below(inner, below),
-            // Cargo joins arrays, and what counts more stands last.
+            // Cargo joins arrays, with the highest priority last.
             (Some(Value::Array(inner)), Value::Array(mut below)) => {
                 below.append(inner);
                 *inner = below;
@@ -178,7 +181,7 @@ fn add_below(table: &mut Table, below: Table) {
     }
 }
 
-/// How these files say to reach the network.
+/// Returns the network settings of these files.
 fn network(files: &[PathBuf]) -> Table {
     let mut table = Table::new();
     for file in files {
@@ -188,19 +191,19 @@ fn network(files: &[PathBuf]) -> Table {
     table
 }
 
-/// Makes `place` a cargo home that has the user's downloaded packages and network settings, and nothing else.
+/// Makes `place` a cargo home with the user's downloaded packages and network settings, and nothing else.
 ///
 /// # Errors
-/// When it cannot be written.
+/// If `place` cannot be written.
 pub fn make_home(place: &Path, folder: &Path, user: Option<&Path>) -> anyhow::Result<()> {
     let unusable = || format!("{} cannot be made a cargo home", place.display());
     let mut settings = network(&files(folder, user));
-    // It would remove packages that the user's cargo still uses.
+    // Cargo's automatic clean-up would remove packages that the user's cargo still uses.
     let never = Table::from_iter([("auto-clean-frequency".to_owned(), "never".into())]);
     settings.insert("cache".to_owned(), never.into());
     fs::create_dir_all(place.join("registry")).with_context(unusable)?;
     fs::write(place.join("config.toml"), settings.to_string()).with_context(unusable)?;
-    // The lock files are shared like the folders that they guard. `registry/src` is not shared: the boot
+    // The lock files are shared with the folders that they guard. `registry/src` is not shared: the boot
     // loader's build script runs in it, and must not find the user's configuration above it.
     for name in [
         "registry/index",
@@ -224,11 +227,12 @@ pub fn make_home(place: &Path, folder: &Path, user: Option<&Path>) -> anyhow::Re
     Ok(())
 }
 
-/// A folder in which no configuration file counts that would change what a build makes: an empty one among the
-/// temporary files. `name` makes it this cache's own, so that one that a killed run left is found and removed.
+/// Returns an empty temporary folder with no configuration file in it or above it that would change the
+/// result of a build. The folder's name has a hash of `name`, so that each cache has its own folder, and the
+/// next run finds and removes a folder that a killed run left.
 ///
 /// # Errors
-/// When there is no such place.
+/// If no folder for temporary files is suitable.
 pub fn neutral(name: &OsStr) -> anyhow::Result<TempDir> {
     let places = [
         env::temp_dir(),
@@ -271,7 +275,8 @@ fn neutral_in(place: &Path, name: &OsStr) -> std::io::Result<TempDir> {
         .tempdir_in(place)
 }
 
-/// A configuration file in or above a folder that says more than how to reach the network.
+/// Returns a configuration file, in or above a folder, with settings that could change the result of a
+/// build.
 fn harmful(folder: &Path) -> Option<PathBuf> {
     let folder = folder.canonicalize().ok()?;
     let says_more = |file: &PathBuf| {
@@ -379,7 +384,7 @@ mod tests {
         fs::create_dir_all(at("user/registry/cache")).unwrap();
         write(&at("user/.package-cache"), "");
         let user = at("user");
-        // Twice: the second run finds what the first one made.
+        // Twice: the second call finds the files of the first.
         for _ in 0..2 {
             make_home(&at("home"), &at("up/clone"), Some(&user)).unwrap();
         }
@@ -420,7 +425,7 @@ mod tests {
             assert_eq!(harmful(&folder).as_ref(), Some(&file), "{harm}");
         }
         let name = OsStr::new("a cache");
-        // What a killed run left is removed.
+        // A folder that a killed run left is removed.
         let left = neutral_in(&folder, name).unwrap().keep();
         fs::write(left.join("file"), "").unwrap();
         let again = neutral_in(&folder, name).unwrap();

@@ -1,7 +1,8 @@
 //! A toolchain that can build freestanding code.
 //!
-//! It is complete if it has the compiler, the compiler's own library sources (`core` is built from them), and the LLVM
-//! programs by which the boot loader's build makes flat binaries. An ordinary stable toolchain has only the compiler.
+//! A complete toolchain has the compiler, the compiler's own library sources (`core` is built from them),
+//! and the LLVM programs with which the boot loader's build makes flat binaries. An ordinary stable
+//! toolchain has only the compiler.
 
 use std::path::{Path, PathBuf};
 
@@ -11,7 +12,7 @@ use super::cache::Locked;
 use super::pin;
 use system::{child, say};
 
-/// Names a complete toolchain in the environment.
+/// The environment variable that names a complete toolchain to use.
 pub const VARIABLE: &str = "CRYSTAL_BALL_TOOLCHAIN";
 
 /// A complete toolchain.
@@ -19,12 +20,15 @@ pub const VARIABLE: &str = "CRYSTAL_BALL_TOOLCHAIN";
 pub struct Toolchain {
     /// The folder with `bin` and `lib`.
     pub folder: PathBuf,
-    /// All that its compiler says of itself: what it builds is good for this very compiler.
+    /// The output of `rustc -vV`. It identifies the compiler for which the image maker was built.
     pub version: String,
 }
 
 impl Toolchain {
-    /// Looks whether the toolchain in a folder is complete; the error names all that is missing.
+    /// Checks that the toolchain in a folder is complete.
+    ///
+    /// # Errors
+    /// If it is not: the message names every missing part.
     pub fn check(folder: &Path) -> anyhow::Result<Self> {
         let incomplete = || format!("{} is not a complete toolchain", folder.display());
         let folder = folder.canonicalize().with_context(incomplete)?;
@@ -56,7 +60,7 @@ impl Toolchain {
         Ok(Self { folder, version })
     }
 
-    /// As [`check`](Self::check), and it must be the pinned version.
+    /// Checks as [`check`](Self::check) does, and also that the version is the pinned one.
     pub fn check_pinned(folder: &Path) -> anyhow::Result<Self> {
         let toolchain = Self::check(folder)?;
         let release = toolchain.release();
@@ -66,7 +70,7 @@ impl Toolchain {
         Ok(toolchain)
     }
 
-    /// The version's number.
+    /// Returns the version's number.
     pub fn release(&self) -> &str {
         field(&self.version, "release").unwrap_or("of unknown version")
     }
@@ -78,12 +82,12 @@ fn field<'a>(version: &'a str, name: &str) -> Option<&'a str> {
         .find_map(|line| line.strip_prefix(name)?.strip_prefix(": "))
 }
 
-/// The name of the pinned toolchain in the cache.
+/// Returns the name of the pinned toolchain in the cache.
 pub fn cached() -> String {
     format!("toolchain-{}", pin::RUST)
 }
 
-/// Puts the pinned toolchain, made aside, into the cache.
+/// Puts a finished toolchain of the pinned version into the cache.
 pub fn keep(cache: &Locked, made: &Path) -> anyhow::Result<Toolchain> {
     Toolchain::check_pinned(made)?;
     let place = cache.put(made, &cached())?;

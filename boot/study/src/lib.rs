@@ -1,6 +1,7 @@
-//! What accuracy costs: the error of each mapper on the host, its cost in RAM, and its cost in the kernel.
+//! The cost of accuracy: each mapper's error on the host, its cost in RAM, and its cost in the kernel.
 //!
-//! [`trade`] measures all of it and writes tables, plots and a page. [`measure`] asks the measuring kernel.
+//! [`trade`] measures all three, and writes tables, plots and a page. [`measure`] runs the benchmark kernel
+//! and reads its answers.
 
 pub mod measure;
 pub mod trade;

@@ -1,10 +1,10 @@
-//! What drawing costs inside the bare machine: the measuring kernel, asked and read.
+//! The cost of drawing on the bare machine, measured by the benchmark kernel.
 //!
-//! Each CPU model is booted twice. Under `-icount shift=0` the guest's clock counts instructions:
-//! figures are exact and must come twice the same, or there is an error. Under plain TCG the same
-//! clock is the host's, and times are good for ratios within one round alone; they come as medians
-//! with their spread. What the timed kernel drew is compared with what the emulated card holds, and
-//! there the accesses are counted, too: see `accesses`.
+//! Each CPU model is booted twice. Under `-icount shift=0` the guest's clock counts instructions: the counts
+//! are exact, and two rounds with different counts are an error. Under plain TCG the same clock is the
+//! host's, and its times are good only for ratios within one round, which are reported as medians with their
+//! spread. The frames that the timed kernel drew are compared with the emulated VGA's. The emulated VGA also
+//! counts the accesses: see `accesses`.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -22,20 +22,20 @@ mod accesses;
 
 pub use accesses::{Accesses, Emulated, Memories};
 
-/// A CPU model of QEMU's.
+/// A CPU model of QEMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cpu {
-    /// What QEMU takes if nothing is said: x86-64 and next to nothing more.
+    /// QEMU's default model: x86-64 with almost no extensions.
     Baseline,
-    /// All that TCG can, bit-extract with it.
+    /// The model with every extension that TCG supports, bit-extract included.
     Max,
 }
 
 impl Cpu {
-    /// Both.
+    /// Both models.
     pub const ALL: [Self; 2] = [Self::Baseline, Self::Max];
 
-    /// QEMU's name for it.
+    /// Returns QEMU's name for the model.
     pub fn name(self) -> &'static str {
         match self {
             Self::Baseline => "qemu64",
@@ -50,23 +50,23 @@ impl fmt::Display for Cpu {
     }
 }
 
-/// What is measured.
+/// The parts to measure.
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// For the set-up.
+    /// The options of the set-up.
     pub options: Options,
-    /// The CPU models, a few minutes each.
+    /// The CPU models. Each one needs a few minutes.
     pub cpus: Vec<Cpu>,
     /// The mappers.
     pub mappers: Vec<Mapper>,
-    /// Rounds that times are the median of, 1 to [`MAX_ROUNDS`].
+    /// The rounds of which times are the median, 1 to [`MAX_ROUNDS`].
     pub rounds: usize,
-    /// Whether runs of each length are measured by themselves, too.
+    /// Whether to measure spans of each length separately, too.
     pub runs: bool,
 }
 
 impl Default for Config {
-    /// All of it, in five rounds.
+    /// Returns the configuration that measures everything, in five rounds.
     fn default() -> Self {
         Self {
             options: Options::default(),
@@ -78,52 +78,52 @@ impl Default for Config {
     }
 }
 
-/// What was measured.
+/// The measured figures.
 #[derive(Clone, Debug)]
 pub struct Measured {
     /// QEMU's version.
     pub qemu: String,
-    /// For each CPU model that was asked for.
+    /// The figures for each requested CPU model.
     pub cpus: Vec<OnCpu>,
 }
 
-/// What was measured on one CPU model.
+/// The figures for one CPU model.
 #[derive(Clone, Debug)]
 pub struct OnCpu {
     /// The model.
     pub cpu: Cpu,
-    /// Whether the kernel found BMI2 on it.
+    /// Whether the kernel found BMI2 on the model.
     pub bmi2: bool,
     /// A row for each mapper in each of [`Order::ALL`].
     pub rows: Vec<Row>,
 }
 
 impl OnCpu {
-    /// The row of a mapper and order.
+    /// Returns the row of a mapper and an order.
     pub fn row(&self, mapper: Mapper, order: Order) -> Option<&Row> {
         let found = |row: &&Row| row.mapper == mapper && row.order == order;
         self.rows.iter().find(found)
     }
 }
 
-/// What a mapper costs in an order.
+/// The costs of a mapper in an order.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// The mapper.
     pub mapper: Mapper,
     /// The order.
     pub order: Order,
-    /// What each piece of work took. The references ([`Work::BareRam`], [`Work::BareCard`],
-    /// [`Work::Present`]) were done in the same rounds as the others.
+    /// The cost of each piece of work. The references ([`Work::BareRam`], [`Work::BareCard`],
+    /// [`Work::Present`]) ran in the same rounds as the other work.
     pub works: BTreeMap<Work, Cost>,
-    /// What runs of one length took, in RAM; empty unless it was asked for.
+    /// The costs of spans of one length, drawn in RAM; empty unless [`Config::runs`] was set.
     pub runs: Vec<RunCost>,
-    /// What a picture of the ball does to the card.
+    /// The accesses of one frame of the ball to the emulated VGA.
     pub accesses: Accesses,
 }
 
 impl Row {
-    /// What a piece of work took.
+    /// Returns the cost of a piece of work.
     ///
     /// # Panics
     /// Never: a row has all of [`Work::ALL`].
@@ -131,34 +131,34 @@ impl Row {
         &self.works[&work]
     }
 
-    /// The work that is a whole frame of the ball in this order, erased, drawn and flipped.
+    /// Returns the work that erases, draws and flips a whole frame of the ball in this order.
     pub fn whole_frame(&self) -> Work {
         whole_frame(self.order)
     }
 
-    /// Instructions a pixel on a full screen in RAM, jobs made beforehand; what a column costs is in
-    /// it, what its job costs is [`Work::ScreenJobs`].
+    /// Returns the instructions a pixel of a full screen drawn in RAM. They include the cost of each column,
+    /// but not the cost of making its job, which is in [`Work::ScreenJobs`].
     pub fn instructions_a_pixel(&self) -> f64 {
         self.cost(Work::ScreenRam).instructions_a_pixel()
     }
 
-    /// How long a whole frame of the ball takes over bare byte stores of as many pixels.
+    /// Returns the time of a whole frame of the ball, relative to bare byte stores of as many pixels.
     pub fn frame_over_bare(&self) -> Spread {
         self.ratio(self.whole_frame(), Work::BareCard)
     }
 
-    /// How long a whole frame of the ball takes over presenting the same bytes already drawn.
+    /// Returns the time of a whole frame of the ball, relative to presenting the same bytes already drawn.
     pub fn frame_over_present(&self) -> Spread {
         self.ratio(self.whole_frame(), Work::Present)
     }
 
-    /// The time of a work over that of another, a pixel of each, round by round.
+    /// Returns the time a pixel of `work`, relative to that of `over`, round by round.
     pub fn ratio(&self, work: Work, over: Work) -> Spread {
         self.cost(work).over(self.cost(over))
     }
 }
 
-/// The work that is a whole frame of the ball in an order.
+/// Returns the work that is a whole frame of the ball in an order.
 fn whole_frame(order: Order) -> Work {
     match order {
         Order::Polygons | Order::Planes => Work::FrameCard,
@@ -166,25 +166,25 @@ fn whole_frame(order: Order) -> Work {
     }
 }
 
-/// What a piece of work took.
+/// The cost of a piece of work.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Cost {
-    /// Pixels drawn in it.
+    /// The pixels that it draws.
     pub pixels: u64,
-    /// Instructions, exact.
+    /// The instructions, exact.
     pub instructions: u64,
-    /// Times under plain TCG, round by round, in ticks of the host's clock: good for ratios to
-    /// others of the same round.
+    /// The times under plain TCG, round by round, in ticks of the host's clock. They are good only for
+    /// ratios to other times of the same round.
     pub ticks: Vec<u64>,
 }
 
 impl Cost {
-    /// Instructions a pixel.
+    /// Returns the instructions a pixel.
     pub fn instructions_a_pixel(&self) -> f64 {
         self.instructions as f64 / self.pixels as f64
     }
 
-    /// The time of a pixel over that of one of the other's, round by round.
+    /// Returns the time a pixel, relative to the other cost's, round by round.
     pub fn over(&self, other: &Self) -> Spread {
         let a_pixel = |cost: &Self, ticks: u64| ticks as f64 / cost.pixels as f64;
         let rounds = self.ticks.iter().zip(&other.ticks);
@@ -208,12 +208,12 @@ impl Cost {
 pub struct Spread {
     /// The median of the rounds' ratios.
     pub median: f64,
-    /// The least of them.
+    /// The smallest of the rounds' ratios.
     pub least: f64,
-    /// The most.
+    /// The largest of the rounds' ratios.
     pub most: f64,
-    /// The least time over the other's least. What disturbs a round only ever adds to it: on a busy
-    /// host this holds when the median does not.
+    /// The ratio of the two shortest times. A disturbance only ever makes a round longer, so on a busy host
+    /// this ratio holds when the median does not.
     pub undisturbed: f64,
 }
 
@@ -232,22 +232,22 @@ impl fmt::Display for Spread {
     }
 }
 
-/// What runs of one length took.
+/// The costs of spans of one length.
 #[derive(Clone, Debug)]
 pub struct RunCost {
-    /// Pixels of each run.
+    /// The pixels of each span.
     pub length: u16,
-    /// Making the jobs of a face of such runs.
+    /// The cost of making the jobs of a face with such spans.
     pub jobs: Cost,
-    /// Drawing them in RAM.
+    /// The cost of drawing the jobs in RAM.
     pub draw: Cost,
 }
 
-/// Builds the measuring kernel if need be, boots it, and measures what `config` asks for.
+/// Builds the benchmark kernel if necessary, boots it, and measures the parts that `config` names.
 ///
 /// # Errors
-/// As [`setup::ready`]; a [`qemu::Failure`]; figures that do not repeat under `-icount`, and
-/// pictures that differ from those of the emulated card.
+/// As [`setup::ready`]; a [`qemu::Failure`]; counts that do not repeat under `-icount`; and frames that
+/// differ from the emulated VGA's.
 pub fn run(config: &Config) -> anyhow::Result<Measured> {
     ensure!(
         (1..=MAX_ROUNDS).contains(&config.rounds),
@@ -294,13 +294,13 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
     })
 }
 
-/// The mappers and orders that the kernel is asked for.
+/// Returns the mappers and orders to measure.
 fn asked(config: &Config) -> impl Iterator<Item = (Mapper, Order)> {
     let mappers = config.mappers.iter();
     mappers.flat_map(|&mapper| Order::ALL.map(|(_, order, _)| (mapper, order)))
 }
 
-/// A machine that runs the measuring kernel.
+/// A machine that runs the benchmark kernel.
 struct Guest {
     machine: Machine,
 }
@@ -317,7 +317,7 @@ impl Guest {
         Ok(Self { machine })
     }
 
-    /// The lines of an answer, without the one that closes it.
+    /// Sends a request, and returns the lines of the answer without its last line.
     fn ask(&mut self, ask: Ask) -> anyhow::Result<Vec<String>> {
         let ask = ask.to_string();
         self.machine.send_line(&ask)?;
@@ -331,10 +331,10 @@ impl Guest {
         }
     }
 
-    /// Ticks of the clock for each instruction, told by a loop of known length.
+    /// Returns the ticks of the clock for each instruction, from a loop of known length.
     ///
     /// # Errors
-    /// A clock that does not count instructions.
+    /// If the clock does not count instructions.
     fn ticks_an_instruction(&mut self) -> anyhow::Result<u64> {
         let answer = self.ask(Ask::Calibrate)?;
         let words: Vec<&str> = answer
@@ -374,7 +374,7 @@ impl Guest {
         Ok(Told { figures })
     }
 
-    /// The figures of an answer, by name.
+    /// Requests figures, and returns them by name.
     fn figures(&mut self, ask: Ask) -> anyhow::Result<BTreeMap<String, Figure>> {
         let answer = self.ask(ask)?;
         let figures = answer.iter().map(|line| {
@@ -389,13 +389,13 @@ impl Guest {
     }
 }
 
-/// What one machine told of a mapper and order.
+/// The figures of one machine for a mapper and an order.
 struct Told {
     figures: BTreeMap<String, Figure>,
 }
 
 impl Told {
-    /// The costs of all work: instructions of `self`, times of `timed`.
+    /// Returns the costs of all work, with the instructions of `self` and the times of `timed`.
     fn costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<BTreeMap<Work, Cost>> {
         let all = Work::ALL.iter();
         all.map(|&(name, work)| Ok((work, self.cost(name, timed, a_tick)?)))
@@ -436,7 +436,7 @@ impl Told {
     }
 }
 
-/// The instructions of a figure that comes the same in each round.
+/// Returns the instructions of a figure, if it is the same in each round.
 fn repeated(name: &str, figure: &Figure, a_tick: u64) -> anyhow::Result<u64> {
     let ticks = figure.ticks();
     ensure!(
@@ -470,7 +470,7 @@ mod tests {
             instructions: 0,
             ticks: ticks.to_vec(),
         };
-        // The second round was disturbed for both, the third for the reference alone.
+        // A disturbance lengthened the second round of both, and the third round of the reference alone.
         let ratio = cost(10, &[20, 200, 22]).over(&cost(5, &[20, 100, 40]));
         let expected = Spread {
             median: 0.5,

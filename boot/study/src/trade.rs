@@ -1,18 +1,19 @@
-//! What accuracy costs: every mapper's error and time on every scene, as tables, plots and pages.
+//! Measures the cost of accuracy: the error and the time of every mapper on every scene, as tables, plots
+//! and pages.
 //!
-//! [`run`] measures, and writes what it found into a folder:
+//! [`run`] measures, and writes these files into a folder:
 //!
-//! | file | what |
+//! | file | contents |
 //! | --- | --- |
-//! | `trade.html` | all of it, with pictures and maps of their errors |
+//! | `trade.html` | all results, with frames and maps of their errors |
 //! | `trade.md`, `trade.csv` | the table, for people and for programs |
-//! | `kernel.csv` | what the kernel takes under QEMU |
-//! | `sweep.csv` | cost by run length and texture angle |
-//! | `error-cost.svg` | error against cost, a point a mapper, over all scenes |
-//! | `error-cost-one.svg` | the same on the tilted square alone |
+//! | `kernel.csv` | the kernel's costs under QEMU |
+//! | `sweep.csv` | cost by span length and texture angle |
+//! | `error-cost.svg` | error against cost, a point for each mapper, over all scenes |
+//! | `error-cost-one.svg` | error against cost on the tilted square alone |
 //! | `error-column.svg` | the error along one long column |
-//! | `cost-length.svg` | cost against run length |
-//! | `pictures/` | the pages' pictures |
+//! | `cost-length.svg` | cost against span length |
+//! | `pictures/` | the page's images |
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -48,17 +49,17 @@ use plot::{Line, Point};
 use subject::Subject;
 use table::{Row, Table};
 
-/// The random scene's seed, unless another is asked for: the same polygons every time.
+/// The default seed of the random scene. A fixed seed gives the same polygons in every run.
 const SEED: u64 = 57;
-/// The picture of a scene that is timed.
+/// The index of the frame of each scene that is timed.
 const TIMED: usize = 1;
-/// The scene whose pictures come first, and whose columns are looked into.
+/// The scenes whose frames the page shows. It also shows a loaded model, and a scene that is measured alone.
 const SHOWN: [&str; 3] = ["tilted", "grazing-16", "cube"];
 /// The scene of the plot of errors along a column.
 const COLUMN: &str = "tilted";
-/// The plot of error against cost on that scene.
+/// The plot of error against cost on the scene [`COLUMN`].
 const ONE_SCENE: &str = "error-cost-one.svg";
-/// The mappers of that plot, and of the one of cost against run length.
+/// The mappers of the plot of errors along a column.
 const ALONG: [&str; 6] = [
     "affine",
     "linear-32",
@@ -67,6 +68,7 @@ const ALONG: [&str; 6] = [
     "quadratic-32",
     "quadratic",
 ];
+/// The mappers of the plot of cost against span length.
 const BY_LENGTH: [&str; 8] = [
     "row-steps",
     "packed",
@@ -78,22 +80,22 @@ const BY_LENGTH: [&str; 8] = [
     "exact",
 ];
 
-/// What to measure, and where to put it.
+/// The options of the measurement, and the folder for its results.
 #[derive(Clone, Debug, clap::Args)]
 pub struct Options {
-    /// The folder for what is found [default: target/crystal-ball/trade of the workspace]
+    /// The folder for the results [default: target/crystal-ball/trade of the workspace]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Only these scenes, with commas between them; `--scene` names one
+    /// Measure only these scenes, separated by commas; `--scene` names one
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(subject::names()))]
     pub scenes: Vec<String>,
-    /// Only these mappers, with commas between them; `--mapper` names one
+    /// Measure only these mappers, separated by commas; `--mapper` names one
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(mapper_names()))]
     pub mappers: Vec<String>,
-    /// Times of a tenth of the length: to look at, not to rely on
+    /// Measure quickly, a twentieth of the time for each value: for a first look, not for reliable times
     #[arg(long)]
     quick: bool,
-    /// Leave out what the kernel takes under QEMU
+    /// Leave out the kernel's costs under QEMU
     #[arg(long)]
     host_only: bool,
     /// The seed of the random polygons
@@ -105,10 +107,10 @@ fn mapper_names() -> impl Iterator<Item = &'static str> {
     Mapper::ALL.iter().map(|named| named.0)
 }
 
-/// Why a build can't measure.
+/// Checks that this is a build whose measurements mean something.
 ///
 /// # Errors
-/// In a build with debug assertions: what it would measure is the checks.
+/// In a build with debug assertions, which would measure its own checks.
 pub fn check_build() -> anyhow::Result<()> {
     ensure!(
         !cfg!(debug_assertions),
@@ -117,11 +119,11 @@ pub fn check_build() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Measures and writes; returns the page's path. With a model it is measured beside the scenes that
-/// were asked for, and alone if none was.
+/// Measures, writes the results, and returns the page's path. A model is measured beside the requested
+/// scenes, or alone if no scene is requested.
 ///
 /// # Errors
-/// When the measuring kernel can't be asked, or a file can't be written.
+/// If the benchmark kernel cannot be run, or a file cannot be written.
 pub fn run(
     options: &Options,
     setup: setup::Options,
@@ -150,7 +152,7 @@ pub fn run(
     };
     fs::create_dir_all(out.join("pictures"))
         .with_context(|| format!("{} cannot be made", out.display()))?;
-    // The kernel first: what is missing for it is told at once.
+    // The kernel comes first, so that a missing part of its set-up is reported at once.
     let measured = match options.host_only {
         true => None,
         false => Some(measure::run(&measure::Config {
@@ -170,7 +172,7 @@ pub fn run(
     Ok(out.join("trade.html"))
 }
 
-/// What was run, and on what.
+/// Returns lines about the run and about the machine.
 fn about(options: &Options, mappers: &[Mapper]) -> Vec<String> {
     let unit = clock::UNIT;
     let mut about = vec![
@@ -195,10 +197,10 @@ fn about(options: &Options, mappers: &[Mapper]) -> Vec<String> {
     about
 }
 
-/// All that was measured.
+/// The results of all measurements.
 #[derive(Debug)]
 struct Found {
-    /// A table a scene.
+    /// A table for each scene.
     tables: Vec<Table>,
     galleries: Vec<Gallery>,
     swept: Vec<Swept>,
@@ -270,7 +272,7 @@ fn measure(
     }
 }
 
-/// The errors down the longest column of a subject's first picture.
+/// Returns the longest column of a subject's first frame, and the errors of some mappers along it.
 fn along_column(subject: &Subject<'_>) -> Option<(u16, Vec<Line>)> {
     let faces = &subject.pictures[0];
     let mut pixels = BTreeMap::new();
@@ -302,7 +304,7 @@ fn along_column(subject: &Subject<'_>) -> Option<(u16, Vec<Line>)> {
 }
 
 impl Found {
-    /// Writes all files; the page last, so that what it names is there.
+    /// Writes all files. The page comes last, so that the files that it names exist.
     fn write(&self, out: &Path, about: &[String]) -> anyhow::Result<()> {
         let put = |name: &str, text: &str| {
             write_atomically(&out.join(name), |file| Ok(file.write_all(text.as_bytes())?))
@@ -390,11 +392,11 @@ impl Found {
         put("trade.html", &page.html())
     }
 
-    /// The plots: file, caption, drawing.
+    /// Returns the plots, each with its file, caption and drawing.
     fn plots(&self, table: &Table) -> anyhow::Result<Vec<(&'static str, String, String)>> {
         let unit = clock::UNIT;
         let mut plots = Vec::new();
-        // All scenes together, and one that is neither the easiest nor the hardest.
+        // All scenes together, and a scene that is neither the easiest nor the hardest.
         let shown = self.tables.iter().find(|shown| shown.scene == COLUMN);
         let shown = shown.filter(|shown| shown.scene != table.scene);
         for (file, table) in [("error-cost.svg", Some(table)), (ONE_SCENE, shown)] {
@@ -493,7 +495,7 @@ mod tests {
         assert_eq!(check_build().is_err(), cfg!(debug_assertions));
     }
 
-    /// All of it at once, as small as can be.
+    /// Measures and writes everything, with as little work as possible.
     #[test]
     fn everything_is_written() {
         let out = tempfile::tempdir().unwrap();
@@ -527,7 +529,7 @@ mod tests {
             let svg = read(name);
             assert!(html.contains(svg.trim()), "{name}");
         }
-        // Every picture that is named is there.
+        // Every image that the page names exists.
         let named = html.split('"').filter(|part| part.starts_with("pictures/"));
         let mut count = 0;
         for name in named {

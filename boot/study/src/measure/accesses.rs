@@ -1,8 +1,7 @@
-//! What drawing does to the card, counted on the emulated one.
+//! The accesses of drawing to video memory and ports, counted on the emulated VGA.
 //!
-//! The measuring kernel counts nothing while it takes time. The same work done here, on a card that
-//! is looked into from outside, says how often the card is reached; and that the kernel drew the same
-//! pictures says that it was the same work.
+//! The benchmark kernel counts nothing while it measures times. So the same work runs here on an emulated
+//! VGA whose accesses are counted. The checksums of the frames prove that both did the same work.
 
 use anyhow::{bail, ensure};
 use cost::{Ask, Bench, Clock, Memory, Work};
@@ -11,20 +10,20 @@ use modex::{Bus, Counted, Tally};
 use texmap::{Mapper, Order};
 use vga::Vga;
 
-/// What a picture of the ball does to the card.
+/// The accesses of one frame of the ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Accesses {
-    /// Port writes and stores that draw, or present what was drawn in RAM.
+    /// The port writes and stores that draw, or that present what was drawn in RAM.
     pub draw: Tally,
-    /// Those that restore the background.
+    /// The accesses that restore the background.
     pub erase: Tally,
-    /// Those that flip.
+    /// The accesses that flip.
     pub flip: Tally,
-    /// Loads from video memory, for whatever purpose.
+    /// The loads from video memory, for any purpose.
     pub loads: u64,
 }
 
-/// What the benches on the emulated card borrow.
+/// The memory that the benches on the emulated VGAs borrow.
 #[derive(Debug)]
 pub struct Memories {
     counted: InPlace<Memory>,
@@ -39,14 +38,14 @@ impl Default for Memories {
     }
 }
 
-/// The measuring kernel's works on the emulated card, with counters and without.
+/// Two benches with the benchmark kernel's work on emulated VGAs: with counters and without.
 #[derive(Debug)]
 pub struct Emulated<'a> {
     counted: Bench<'a, Counted<Vga>>,
     plain: Bench<'a, Vga>,
 }
 
-/// Nobody takes the time here.
+/// A clock that stands still, because nothing is timed here.
 const NO_CLOCK: Clock = Clock {
     now: || 0,
     instructions: |_| (),
@@ -54,7 +53,7 @@ const NO_CLOCK: Clock = Clock {
 };
 
 impl<'a> Emulated<'a> {
-    /// Cards as after the mode set.
+    /// Returns benches whose emulated VGAs are in the state after the mode set.
     pub fn new(memories: &'a mut Memories) -> Self {
         let taken = "the emulated card takes Mode X";
         let counted = Counted::new(Vga::new());
@@ -64,16 +63,16 @@ impl<'a> Emulated<'a> {
         }
     }
 
-    /// What a picture of the ball, frame [`cost::FRAME`], does to the card: drawn by a mapper in an
-    /// order, on a page that holds the same picture before.
+    /// Returns the accesses of one frame of the ball, frame [`cost::FRAME`], that a mapper draws in an order
+    /// on a page that holds the same frame already.
     ///
     /// # Errors
-    /// Accesses at fault, and counts that differ from picture to picture.
+    /// Accesses that are faults, and counts that differ from frame to frame.
     pub fn accesses(&mut self, mapper: Mapper, order: Order) -> anyhow::Result<Accesses> {
         let work = super::whole_frame(order);
         let bench = &mut self.counted;
         bench.set(mapper, order);
-        // It has the ball on every page.
+        // This work puts the ball on every page.
         bench.prepare(Work::Present);
         let mut one = || {
             bench.bus().take_counts();
@@ -106,11 +105,11 @@ impl<'a> Emulated<'a> {
         })
     }
 
-    /// The checksums of what each work draws, in the measuring kernel's words: on a card without a
-    /// counter and on one behind counters.
+    /// Returns the checksums of each work's frame, in the form of the benchmark kernel's answer: without
+    /// counters, and with counters.
     ///
     /// # Errors
-    /// Accesses at fault.
+    /// Accesses that are faults.
     pub fn checksums(&mut self, mapper: Mapper, order: Order) -> anyhow::Result<[Vec<String>; 2]> {
         let plain = check(&mut self.plain, mapper, order);
         let counted = check(&mut self.counted, mapper, order);
@@ -122,10 +121,10 @@ impl<'a> Emulated<'a> {
         Ok([plain, counted])
     }
 
-    /// Compares checksums that the kernel told with those of the emulated card.
+    /// Compares the kernel's checksums with the emulated VGA's.
     ///
     /// # Errors
-    /// A picture that differs.
+    /// A frame that differs.
     pub fn compare(&mut self, mapper: Mapper, order: Order, told: &[String]) -> anyhow::Result<()> {
         for emulated in self.checksums(mapper, order)? {
             ensure!(
@@ -138,7 +137,7 @@ impl<'a> Emulated<'a> {
     }
 }
 
-/// The lines of the answer to `check`, without the one that closes it.
+/// Returns the lines of the answer to `check`, without its last line.
 fn check<B: Bus>(bench: &mut Bench<'_, B>, mapper: Mapper, order: Order) -> Vec<String> {
     let mut answer = Vec::new();
     bench.answer(Ask::Check(mapper, order), &NO_CLOCK, &mut |line| {

@@ -1,8 +1,9 @@
-//! How far a mapper's coordinates are from the truth, and its picture from the exact mapper's.
+//! The error of a mapper's coordinates, and the difference of its frame from the exact mapper's.
 //!
-//! The truth at a pixel is the quotient of the plane's integers at its centre, brought into the
-//! texture. The error is the larger of |u' - u| and |v' - v|, in texels, where (u', v') is where
-//! the mapper is: 16.16, so an exact mapper's is off by less than 2^-16.
+//! The truth at a pixel is the quotient of the plane's integers at the pixel's centre, clamped into the
+//! texture. The error is the larger of |u' - u| and |v' - v|, in texels, where (u, v) is the truth and (u',
+//! v') is the mapper's coordinate. Mappers have 16.16 coordinates, so even the exact mapper's error is
+//! between 0 and 2^-16.
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use texmap::plane::{Plane, texel};
@@ -11,27 +12,28 @@ use texmap::{JobList, Mapper, Order, Renderer, Texture};
 use super::stats::{Errors, psnr};
 use super::subject::{Owned, Subject};
 
-/// Jobs of a whole picture.
+/// The jobs of a whole frame.
 pub type Jobs = JobList<{ scene::MAX_JOBS }>;
 
 /// A mapper's accuracy on a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Accuracy {
-    /// The texel errors of all pixels.
+    /// The errors of all pixels, in texels.
     pub errors: Errors,
-    /// Pixels that show another texel than the exact mapper's.
+    /// The number of pixels whose texel is not the exact mapper's.
     pub other_texels: u64,
-    /// Peak signal to noise, decibels, each picture whole against the exact mapper's: the worst.
+    /// The peak signal-to-noise ratio of a whole frame against the exact mapper's, in decibels: the worst of
+    /// all frames.
     pub psnr: f64,
 }
 
 impl Accuracy {
-    /// The share of pixels with another texel than the exact mapper's, 0 to 1.
+    /// Returns the share of pixels whose texel is not the exact mapper's, 0 to 1.
     pub fn other_share(&self) -> f64 {
         self.other_texels as f64 / self.errors.count().max(1) as f64
     }
 
-    /// Takes another scene's in.
+    /// Adds the accuracy on another scene.
     pub fn extend(&mut self, other: &Self) {
         self.errors.extend(&other.errors);
         self.other_texels += other.other_texels;
@@ -55,7 +57,7 @@ impl Truth {
             let size_c = i64::from(size).checked_mul(c);
             match n {
                 ..0 => 0.0,
-                // As everywhere: the border, and what lies on the horizon and behind it.
+                // As in the mappers: points beyond the texture, on the horizon and behind it get the border.
                 _ if size_c.is_none_or(|most| n >= most) => f64::from(size),
                 _ => n as f64 / c as f64,
             }
@@ -68,8 +70,8 @@ impl Truth {
     }
 }
 
-/// Calls `sink` with each pixel of a face, its error in texels, and whether its texel is another
-/// than the exact mapper's.
+/// Calls `sink` with each pixel of a face, its error in texels, and whether its texel differs from the exact
+/// mapper's.
 pub fn errors(
     mapper: Mapper,
     face: &Owned,
@@ -90,7 +92,7 @@ pub fn errors(
     dropped.expect("a scene's faces are legal");
 }
 
-/// A picture of a subject, drawn by a mapper.
+/// Draws a frame of a subject with a mapper, and returns its pixels.
 pub fn picture(subject: &Subject<'_>, number: usize, mapper: Mapper, jobs: &mut Jobs) -> Vec<u8> {
     let mut page = Box::new(PlanarBuffer::new());
     page.clear(&subject.background);
@@ -104,7 +106,7 @@ pub fn picture(subject: &Subject<'_>, number: usize, mapper: Mapper, jobs: &mut 
     pixels.collect()
 }
 
-/// A mapper on all pictures of a subject.
+/// Measures a mapper on all frames of a subject.
 pub fn measure(subject: &Subject<'_>, mapper: Mapper, jobs: &mut Jobs) -> Accuracy {
     let mut accuracy = Accuracy {
         psnr: f64::INFINITY,
@@ -147,8 +149,9 @@ mod tests {
         }
     }
 
-    /// The bound of facts of perspective: the worst of an affine column whose depth ratio is r is
-    /// |du| (sqrt r - 1) / (sqrt r + 1). A floor that lies level has the same in every column.
+    /// Checks the bound for affine columns. If the depths at a column's ends have the ratio r, and u differs
+    /// by du between the ends, the largest error in u is |du| (sqrt r - 1) / (sqrt r + 1). On a level floor,
+    /// every column has the same error.
     #[test]
     fn an_affine_column_errs_as_the_formula_says() {
         let affine = Mapper::parse("affine").unwrap();
@@ -160,7 +163,7 @@ mod tests {
                 errors(affine, face, texture, |_, error, _| {
                     worst = worst.max(error)
                 });
-                // The square's depths are 2.3 -+ 1 units at most: a ratio below 2.6; and a column
+                // The square's depths are at most 2.3 -+ 1 units, so their ratio is below 2.6. A column
                 // crosses at most the diagonal's 256 texels in either coordinate.
                 let root = 2.6f64.sqrt();
                 let bound = 256.0 * (root - 1.0) / (root + 1.0);
@@ -175,7 +178,7 @@ mod tests {
         let mut jobs = Box::new(Jobs::new());
         with("facing", 0, |subject| {
             let accuracy = measure(subject, affine, &mut jobs);
-            // Vertices are on a grid of 1/256 pixel, the truth is not.
+            // Vertices are on a grid of 1/256 pixel, but the truth is not.
             assert!(accuracy.errors.largest() < 0.02, "{accuracy:?}");
             assert!(accuracy.psnr > 25.0);
         });

@@ -1,20 +1,20 @@
-//! The finest clock there is: the CPU's cycle counter on x86-64, the system's time elsewhere.
+//! The finest clock available: the CPU's cycle counter on x86-64, the system's time elsewhere.
 
-/// What [`now`] counts.
+/// The unit of [`now`].
 pub const UNIT: &str = if cfg!(target_arch = "x86_64") {
     "cycles"
 } else {
     "ns"
 };
 
-/// A point in time, in [`UNIT`]s since some other.
+/// Returns the time since a fixed point, in [`UNIT`]s.
 #[cfg(target_arch = "x86_64")]
 pub fn now() -> u64 {
     // SAFETY: every x86-64 has a time stamp counter, and Linux lets user programs read it.
     unsafe { std::arch::x86_64::_rdtsc() }
 }
 
-/// A point in time, in [`UNIT`]s since some other.
+/// Returns the time since a fixed point, in [`UNIT`]s.
 #[cfg(not(target_arch = "x86_64"))]
 pub fn now() -> u64 {
     use std::sync::OnceLock;
@@ -23,7 +23,7 @@ pub fn now() -> u64 {
     START.get_or_init(Instant::now).elapsed().as_nanos() as u64
 }
 
-/// The CPU, and those of its features that mappers may use.
+/// Returns the CPU's name, and those of its features that mappers may use.
 pub fn cpu() -> String {
     let info = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let line = info.lines().find(|line| line.starts_with("model name"));

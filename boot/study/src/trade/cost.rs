@@ -1,10 +1,10 @@
-//! What mappers cost in RAM, on this CPU.
+//! The costs of the mappers in RAM, on this CPU.
 //!
-//! Everything is drawn into a planar buffer. Times move by several per cent from run to run, and
-//! with what else the machine does, so they are told as ratios of what was measured in turns:
-//! every contestant draws in every round, the rounds forwards and backwards by turns, and each
-//! ratio is of two times of the same round. A round's time is that of the fastest of several
-//! drawings one after the other: what disturbs can only make it longer.
+//! Everything is drawn into a planar buffer. Times vary by several per cent from run to run, and with the
+//! load of the machine, so they are reported as ratios of times that were measured by turns. Every
+//! contestant draws in every round, every second round runs backwards, and each ratio is of two times of one
+//! round. A round's time is that of the fastest of several drawings in a row, because a disturbance can only
+//! make a drawing slower.
 
 use modex::{Destination, PlanarBuffer};
 use texmap::coverage::Axis;
@@ -17,23 +17,23 @@ use super::clock;
 use super::stats::Spread;
 use super::subject::{Owned, Subject};
 
-/// Rounds, of whose values the median is told.
+/// The number of rounds. The reported value is their median.
 pub const ROUNDS: usize = 5;
 
-/// The orders that differ in RAM. [`Order::Buffer`] draws as one of them does; presenting costs
-/// where there is a card.
+/// The orders that differ in RAM. [`Order::Buffer`] draws as one of them does, and its presenting costs time
+/// only where a card exists.
 pub const ORDERS: [Order; 2] = [Order::Polygons, Order::Planes];
 
-/// What is measured.
+/// The work that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum What {
-    /// Drawing alone: the jobs were made before.
+    /// Drawing alone, of jobs made beforehand.
     Loops,
-    /// A whole picture: its jobs are made and drawn.
+    /// A whole frame: making its jobs and drawing them.
     Picture,
 }
 
-/// How the bare loop goes over the pixels.
+/// The way in which the bare loop visits the pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Way {
     /// Down the columns.
@@ -44,18 +44,18 @@ enum Way {
     Passes,
 }
 
-/// Who draws.
+/// The code that draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Who {
-    /// A load and a store a pixel, and nothing else.
+    /// A load and a store for each pixel, and nothing else.
     Bare(Way),
     Mapper(Mapper),
-    /// The portable twin of a mapper's loop.
+    /// The portable reference of a mapper's loop.
     Twin(Loop),
 }
 
 impl Who {
-    /// The bare loop that goes over the pixels as a mapper does.
+    /// Returns the bare loop that visits the pixels as the mapper does.
     fn bare(mapper: Mapper) -> Self {
         use texmap::Rows;
         Self::Bare(match mapper {
@@ -68,7 +68,7 @@ impl Who {
 
 type Key = (Who, Order, What);
 
-/// What drawing needs.
+/// The memory that drawing needs.
 struct Arena {
     page: Box<PlanarBuffer>,
     jobs: Box<Jobs>,
@@ -82,8 +82,8 @@ struct Contestant<'a> {
     draw: Draw<'a>,
 }
 
-/// The loop that this CPU draws with instructions that not every CPU of its kind has, if that is
-/// the mapper's.
+/// Returns the mapper's loop, if this CPU runs it with instructions that not every CPU of its architecture
+/// has.
 pub fn beyond_baseline(mapper: Mapper) -> Option<Loop> {
     match mapper {
         Mapper::Affine(Loop::Extract) if Loop::Extract.is_tuned_here() => Some(Loop::Extract),
@@ -91,14 +91,14 @@ pub fn beyond_baseline(mapper: Mapper) -> Option<Loop> {
     }
 }
 
-/// What drawing a pixel costs.
+/// The cost of drawing a pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Cost {
-    /// In [`clock::UNIT`]s.
+    /// The time, in [`clock::UNIT`]s.
     pub time: Spread,
-    /// As a ratio to a bare load and store a pixel in the same order.
+    /// The ratio to a bare load and store for each pixel, in the same order.
     pub to_bare: Spread,
-    /// As a ratio to `packed` in the polygons' order, in what is measured.
+    /// The ratio to the mapper `packed`, polygon by polygon, at the same work.
     pub to_packed: Spread,
 }
 
@@ -107,31 +107,32 @@ pub struct Cost {
 pub struct Costs {
     /// The mapper.
     pub mapper: Mapper,
-    /// In which order.
+    /// The order.
     pub order: Order,
-    /// Drawing alone.
+    /// The cost of drawing alone.
     pub loops: Cost,
-    /// The whole picture.
+    /// The cost of the whole frame.
     pub picture: Cost,
-    /// Drawing alone, by the portable twin of a loop whose instructions not every CPU has.
+    /// The cost of drawing alone with the portable reference, for a loop whose instructions not every CPU
+    /// has.
     pub twin: Option<Cost>,
 }
 
-/// How long it may take.
+/// The time that a measurement may need.
 #[derive(Clone, Copy, Debug)]
 pub struct Effort {
-    /// Of drawing for one value, in [`clock::UNIT`]s; at least two drawings.
+    /// The time of drawing for one value, in [`clock::UNIT`]s. At least two drawings are made.
     pub slice: u64,
 }
 
 impl Effort {
-    /// For figures.
+    /// The effort for figures.
     pub const FULL: Self = Self { slice: 12_000_000 };
-    /// To see that it works.
+    /// The effort to see that everything works.
     pub const QUICK: Self = Self { slice: 600_000 };
 }
 
-/// The pixels and the jobs of a mapper on faces.
+/// Returns the jobs of a mapper on faces, and the number of their pixels.
 ///
 /// # Panics
 /// If a face is not legal.
@@ -150,8 +151,8 @@ fn jobs(mapper: Mapper, faces: &[Owned], subject: &Subject<'_>) -> (Vec<Job>, u6
     (jobs, pixels)
 }
 
-/// Jobs with those of a plane beside each other if that is the order. [`Renderer`] chains them so;
-/// here it is no part of what is timed.
+/// Sorts jobs by plane, if the order requires it. [`Renderer`] chains jobs by plane; here the sorting is not
+/// part of the timed work.
 fn in_order(order: Order, (mut jobs, pixels): (Vec<Job>, u64)) -> (Vec<Job>, u64) {
     if order != Order::Polygons {
         jobs.sort_by_key(|job| job.x & 3);
@@ -186,7 +187,7 @@ fn draw(
     }
 }
 
-/// Draws affine columns with the portable twin of a loop.
+/// Draws affine columns with the portable reference of a loop.
 fn draw_by_twin(
     jobs: &[Job],
     twin: Loop,
@@ -215,9 +216,9 @@ fn draw_by_twin(
     }
 }
 
-/// Loads and stores for every pixel of some jobs.
+/// Loads and stores a byte for every pixel of some jobs.
 fn bare(jobs: &[Job], way: Way, order: Order, texels: &[u8; 256], page: &mut PlanarBuffer) {
-    // The compiler can't see that the index needs no bounds check, but for a byte.
+    // Only with a byte as the index does the compiler see that no bounds check is needed.
     let mut at = 0u8;
     let mut load = || {
         at = at.wrapping_add(1);
@@ -263,7 +264,7 @@ fn bare(jobs: &[Job], way: Way, order: Order, texels: &[u8; 256], page: &mut Pla
     }
 }
 
-/// Every contestant on some faces: the mappers, and the bare loops that they are compared with.
+/// Returns every contestant on some faces: the mappers, and the bare loops that they are compared with.
 fn contestants<'a>(
     mappers: &[Mapper],
     faces: &'a [Owned],
@@ -341,7 +342,7 @@ fn contestants<'a>(
     all
 }
 
-/// The time a pixel of each contestant in each round.
+/// Returns the time a pixel of each contestant in each round.
 fn race(contestants: &[Contestant<'_>], effort: Effort) -> Vec<Vec<f64>> {
     let mut arena = Arena {
         page: Box::new(PlanarBuffer::new()),
@@ -357,7 +358,7 @@ fn race(contestants: &[Contestant<'_>], effort: Effort) -> Vec<Vec<f64>> {
     for _ in 0..ROUNDS {
         for &i in &order {
             let contestant = &contestants[i];
-            // The first is there to warm the caches.
+            // The first drawing warms the caches.
             let first = time(contestant).max(1);
             let drawings = (effort.slice / first).clamp(2, 1000);
             let fastest = (0..drawings).map(|_| time(contestant)).min();
@@ -369,13 +370,13 @@ fn race(contestants: &[Contestant<'_>], effort: Effort) -> Vec<Vec<f64>> {
     times
 }
 
-/// How many times as long one took as the other, round by round.
+/// Returns the ratio of two contestants' times, round by round.
 fn ratio(times: &[f64], others: &[f64]) -> Spread {
     let ratios: Vec<f64> = times.iter().zip(others).map(|(a, b)| a / b).collect();
     Spread::of(&ratios)
 }
 
-/// Times of a race, by who it was.
+/// The times of a race, by contestant.
 struct Times(Vec<(Key, Vec<f64>)>);
 
 impl Times {
@@ -405,7 +406,7 @@ impl Times {
     }
 }
 
-/// What `mappers` cost on a picture of a subject. `packed` takes part in any case.
+/// Returns the costs of `mappers` on a frame of a subject. `packed` always takes part.
 pub fn measure(
     subject: &Subject<'_>,
     number: usize,
@@ -439,34 +440,34 @@ pub fn measure(
     costs
 }
 
-/// The cost of drawing alone on runs of one length, with the texture at one angle.
+/// The cost of drawing alone for spans of one length, with the texture at one angle.
 #[derive(Clone, Copy, Debug)]
 pub struct Swept {
-    /// Pixels of each run down a column.
+    /// The pixels of each span down a column.
     pub length: u16,
-    /// The texture's angle on the screen in degrees.
+    /// The texture's angle on the screen, in degrees.
     pub angle: f64,
     /// The mapper.
     pub mapper: Mapper,
-    /// In which order.
+    /// The order.
     pub order: Order,
-    /// Drawing alone.
+    /// The cost of drawing alone.
     pub cost: Cost,
 }
 
-/// Run lengths that are swept, at [`ANGLE`].
+/// The span lengths to sweep, at [`ANGLE`].
 pub const LENGTHS: [u16; 10] = [1, 2, 4, 8, 16, 32, 64, 120, 180, 240];
-/// Angles that are swept besides [`ANGLE`], with runs of [`LENGTH`].
+/// The angles to sweep besides [`ANGLE`], with spans of [`LENGTH`].
 pub const ANGLES: [f64; 6] = [0.0, 15.0, 45.0, 60.0, 75.0, 90.0];
-/// The angle at which lengths are swept.
+/// The angle at which lengths are swept, in degrees.
 pub const ANGLE: f64 = 30.0;
-/// The length with which angles are swept.
+/// The length at which angles are swept, in pixels.
 pub const LENGTH: u16 = 240;
-/// Texels a pixel: the turned screen fits into the texture at any angle.
+/// Texels a pixel, such that the rotated screen fits into the texture at any angle.
 const SCALE: f64 = 0.63;
 
-/// Strips over the whole screen, each `length` pixels high, in one facing plane whose texture is
-/// turned by `angle` degrees.
+/// Returns strips over the whole screen, each `length` pixels high, in one facing plane whose texture is
+/// rotated by `angle` degrees.
 fn strips(length: u16, angle: f64) -> Vec<Owned> {
     let (sin, cos) = angle.to_radians().sin_cos();
     let texel = |x: i32, y: i32| {
@@ -487,7 +488,7 @@ fn strips(length: u16, angle: f64) -> Vec<Owned> {
                 v,
             }
         });
-        // Two units away; where on the plane does not matter.
+        // Two units away. The position on the plane does not matter.
         let far = 2 * 65_536;
         let anchors = [(0, 0), (320, 0), (320, 240)].map(|(x, y)| {
             let [u, v] = texel(x, y);
@@ -503,7 +504,7 @@ fn strips(length: u16, angle: f64) -> Vec<Owned> {
     (0..240 / length).map(strip).collect()
 }
 
-/// Sweeps run lengths and angles. `done` is told after each of [`SWEEPS`].
+/// Sweeps span lengths and angles. Calls `done` after each of the [`SWEEPS`] steps.
 pub fn sweep(
     subject: &Subject<'_>,
     mappers: &[Mapper],
@@ -539,7 +540,7 @@ pub fn sweep(
     swept
 }
 
-/// What unrolling gains: the time of a plain loop as a ratio to that of the same loop unrolled
+/// Returns the gain from unrolling: the time of a plain loop, relative to that of the same loop unrolled
 /// eight times, on the longest strips, plane by plane.
 pub fn unrolling(subject: &Subject<'_>, effort: Effort) -> Spread {
     let affine = Mapper::parse("affine").expect("it is one of all");
@@ -589,7 +590,7 @@ pub fn unrolling(subject: &Subject<'_>, effort: Effort) -> Spread {
     ratio(&times[0], &times[1])
 }
 
-/// Steps of [`sweep`].
+/// The number of steps of [`sweep`].
 pub const SWEEPS: usize = LENGTHS.len() + ANGLES.len();
 
 #[cfg(test)]
@@ -629,8 +630,8 @@ mod tests {
         });
     }
 
-    /// What is timed draws what it is said to draw: the renderer's picture, and the bare loops as
-    /// many pixels.
+    /// Checks that the timed code draws the right pixels: mappers draw the renderer's frame, and bare loops
+    /// draw as many pixels.
     #[test]
     fn contestants_draw_whole_pictures() {
         with("tilted", 0, |subject| {

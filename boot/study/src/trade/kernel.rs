@@ -1,4 +1,4 @@
-//! What the measuring kernel said, as a table, and what was aimed at beside what was measured.
+//! The benchmark kernel's figures as a table, and the targets beside the measurements.
 
 use std::fmt::Display;
 
@@ -8,8 +8,8 @@ use super::cost::{ANGLE, LENGTH, Swept};
 use super::table::Table;
 use crate::measure::{Cpu, Measured, Row, Spread};
 
-/// The kernel's table: a line for each mapper in each order, figures of the plain CPU model, and of
-/// the other what differs.
+/// Returns the kernel's table: a row for each mapper in each order, with the figures of the baseline CPU
+/// model, and the instructions of the other model.
 pub fn cells(measured: &Measured) -> Vec<Vec<String>> {
     let head = [
         "mapper",
@@ -66,10 +66,10 @@ fn of(measured: &Measured, cpu: Cpu) -> &[Row] {
     on.map_or(&[], |on| &on.rows)
 }
 
-/// A figure of the run, if all that it needs was measured.
+/// A figure of the run, if everything that it needs was measured.
 type Figure = Option<f64>;
 
-/// What was aimed at, what came out, and whether it is met.
+/// Returns the targets, the measured values, and whether each target is met.
 pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -> Vec<Vec<String>> {
     let mut cells = vec![
         ["what", "aimed at", "measured", ""]
@@ -114,7 +114,7 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
         false,
         over(host.time("row-multiply", Order::Polygons), best),
     );
-    // By polygons: in the order of the planes rows are not drawn as a mapper of rows says.
+    // Polygon by polygon, because plane by plane the mappers of rows do not draw rows as their names say.
     let screen = |cpu, mapper: fn(Mapper) -> bool| -> Figure {
         let rows = of(measured?, cpu).iter();
         let figures = rows
@@ -188,14 +188,14 @@ fn over(a: Figure, b: Figure) -> Figure {
     Some(a? / b?)
 }
 
-/// What was measured in RAM.
+/// The measurements in RAM.
 struct Host<'a> {
     tables: &'a [Table],
     swept: &'a [Swept],
 }
 
 impl Host<'_> {
-    /// The long runs of an order.
+    /// Returns the measurements of an order on long spans.
     fn long(&self, order: Order) -> impl Iterator<Item = &Swept> {
         let of = move |swept: &&Swept| {
             swept.length == LENGTH && swept.angle == ANGLE && swept.order == order
@@ -203,7 +203,7 @@ impl Host<'_> {
         self.swept.iter().filter(of)
     }
 
-    /// The affine column loop that is fastest on long runs.
+    /// Returns the affine column loop that is fastest on long spans.
     fn best(&self, order: Order) -> Option<&Swept> {
         let affine = self
             .long(order)
@@ -211,7 +211,7 @@ impl Host<'_> {
         affine.min_by(|a, b| a.cost.time.median.total_cmp(&b.cost.time.median))
     }
 
-    /// A mapper's time on long runs.
+    /// Returns a mapper's time on long spans.
     fn time(&self, mapper: &str, order: Order) -> Figure {
         let swept = self
             .long(order)
@@ -219,7 +219,7 @@ impl Host<'_> {
         swept.map(|swept| swept.cost.time.median)
     }
 
-    /// The time of a scene's picture in the cheaper of the orders.
+    /// Returns the time of a scene's frame, in the cheaper of the orders.
     fn picture(&self, scene: &str, mapper: impl Display) -> Figure {
         let table = self.tables.iter().find(|table| table.scene == scene)?;
         let row = table

@@ -1,4 +1,4 @@
-//! The page: plots, pictures with maps of their errors, and the tables. It needs no network.
+//! The HTML page: plots, frames with maps of their errors, and the tables. It needs no network.
 
 use std::fmt::Write as _;
 
@@ -11,12 +11,12 @@ use super::table::{decibels, percent, texels};
 use frames::indexed::Indexed;
 use frames::screen::Screen;
 
-/// What this page adds to the style sheet of the reports.
+/// The page's addition to the style sheet of the reports.
 const STYLE: &str = include_str!("page.css");
 
-/// The errors that the maps' colours tell apart, as powers of two of a texel.
+/// The range of errors that the maps' colours distinguish, as powers of two of a texel.
 const HEAT: (f64, f64) = (-8.0, 5.0);
-/// The maps' colours, evenly over [`HEAT`]; page.css has them, too, for the legend.
+/// The maps' colours, evenly over [`HEAT`]. The legend's gradient in page.css has the same colours.
 const COLOURS: [[u8; 3]; 6] = [
     [0x10, 0x10, 0x2A],
     [0x2B, 0x3F, 0x9E],
@@ -25,35 +25,35 @@ const COLOURS: [[u8; 3]; 6] = [
     [0xFB, 0x9A, 0x3C],
     [0xFF, 0xF5, 0xB0],
 ];
-/// Where there is no solid.
+/// The maps' colour where no solid is.
 const NOTHING: [u8; 3] = [0x4C, 0x4C, 0x4C];
 
-/// A picture and the map of its errors, which one or several mappers have alike.
+/// A frame and the map of its errors, shared by all mappers that draw both alike.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// The mappers' names.
     pub mappers: Vec<String>,
-    /// What they draw.
+    /// The frame.
     pub picture: Indexed,
-    /// How far off its texels are.
+    /// The map of the frame's errors.
     pub heat: Screen,
-    /// Their accuracy on the picture.
+    /// The mappers' accuracy on the frame.
     pub accuracy: Accuracy,
 }
 
-/// The pictures of a scene.
+/// The frames of a scene.
 #[derive(Clone, Debug)]
 pub struct Gallery {
     /// The scene's name.
     pub scene: String,
-    /// A line about it.
+    /// A line about the scene.
     pub about: String,
-    /// The pictures that differ.
+    /// The frames that differ.
     pub shown: Vec<Shown>,
 }
 
 impl Gallery {
-    /// The first picture of a subject by all mappers.
+    /// Draws a subject's first frame with each mapper.
     pub fn new(subject: &Subject<'_>, mappers: &[Mapper], jobs: &mut Jobs) -> Self {
         let mut shown: Vec<Shown> = Vec::new();
         let colours = |pixels: &[u8]| {
@@ -105,10 +105,10 @@ impl Gallery {
         }
     }
 
-    /// The file of a picture, or of its map.
+    /// Returns the file name of a frame, or of its map.
     pub fn file(&self, shown: &Shown, map: bool) -> String {
         let of = if map { "-error" } else { "" };
-        // A name may have a slash.
+        // A mapper's name can have a slash.
         let mapper = shown.mappers[0].replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         format!("{}-{mapper}{of}.png", self.scene)
     }
@@ -142,7 +142,7 @@ impl Gallery {
     }
 }
 
-/// The colour of an error in texels.
+/// Returns the colour of an error in texels.
 fn colour(error: f64) -> [u8; 3] {
     let (from, to) = HEAT;
     let steps = (COLOURS.len() - 1) as f64;
@@ -155,25 +155,25 @@ fn colour(error: f64) -> [u8; 3] {
     })
 }
 
-/// What the page is made of.
+/// The parts of the page.
 #[derive(Debug)]
 pub struct Page<'a> {
-    /// What was run, and on what: a line each.
+    /// Lines about the run and about the machine.
     pub about: &'a [String],
-    /// Plots, as SVG, each with a caption.
+    /// The plots, each with a caption and the SVG.
     pub plots: &'a [(String, String)],
-    /// Pictures.
+    /// The frames.
     pub galleries: &'a [Gallery],
-    /// The folder of the pictures, beside the page.
+    /// The folder of the images, beside the page.
     pub folder: &'a str,
-    /// Tables: a title, a line about it, and the cells. The first is shown open.
+    /// The tables, each with a title, a line about it, and the cells. The first table is shown open.
     pub tables: &'a [(String, String, Vec<Vec<String>>)],
-    /// The seeds on trial.
+    /// The cells of the table of the sources' claims.
     pub trials: &'a [Vec<String>],
 }
 
 impl Page<'_> {
-    /// The page as HTML.
+    /// Returns the page as HTML.
     pub fn html(&self) -> String {
         let mut page = format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -237,7 +237,7 @@ const LEGEND: &str = "<aside class=\"heat\"><span>Maps of the error, in texels:<
                       <i></i><ol><li>1/256</li><li>1/32</li><li>1/4</li><li>2</li><li>8</li><li>32</li></ol>\
                       <span>grey: no solid</span></aside>\n";
 
-/// A table; the first line is its head.
+/// Adds a table to the page. The first line of `cells` is the header.
 fn table(page: &mut String, cells: &[Vec<String>]) {
     *page += "<div class=\"wide\"><table>\n";
     for (i, line) in cells.iter().enumerate() {
@@ -255,7 +255,7 @@ fn table(page: &mut String, cells: &[Vec<String>]) {
     *page += "</tbody>\n</table></div>\n";
 }
 
-/// What stands between backticks as code.
+/// Returns the text with everything between backticks as code.
 fn code(text: &str) -> String {
     let mut out = String::new();
     for (i, part) in text.split('`').enumerate() {

@@ -1,6 +1,6 @@
 //! Plots, as SVG.
 //!
-//! Scales, ticks and the places of names are worked out here; `plotters` writes the drawing.
+//! This module computes scales, ticks and the places of names; `plotters` writes the drawing.
 
 use anyhow::anyhow;
 use plotters::prelude::*;
@@ -11,9 +11,9 @@ use super::stats::pareto;
 
 /// A plot's width in SVG's pixels.
 const WIDTH: i32 = 1120;
-/// Its height.
+/// A plot's height in SVG's pixels.
 const HEIGHT: i32 = 680;
-/// Between the drawing's border and the axes: left, right, top, bottom.
+/// The space between the drawing's border and the axes: left, right, top, bottom.
 const MARGINS: [i32; 4] = [96, 36, 92, 72];
 
 const INK: RGBColor = RGBColor(0x1B, 0x1B, 0x20);
@@ -22,7 +22,7 @@ const LINE: RGBColor = RGBColor(0xE4, 0xE4, 0xEA);
 const FRONT: RGBColor = RGBColor(0xC8, 0x10, 0x4F);
 const FONT: &str = "system-ui, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
-/// Families of mappers, with their colours: apart for every kind of eyes (after Okabe and Ito).
+/// The families of mappers, with colours that colour-blind readers can distinguish (after Okabe and Ito).
 const FAMILIES: [(&str, RGBColor); 7] = [
     ("affine rows", RGBColor(0xB4, 0x5F, 0x06)),
     ("affine columns", RGBColor(0x00, 0x72, 0xB2)),
@@ -33,7 +33,7 @@ const FAMILIES: [(&str, RGBColor); 7] = [
     ("exact", INK),
 ];
 
-/// Which of [`FAMILIES`] a mapper belongs to.
+/// Returns the index in [`FAMILIES`] of a mapper's family.
 fn family(mapper: Mapper) -> usize {
     match mapper {
         Mapper::Rows(_) => 0,
@@ -51,35 +51,35 @@ fn family(mapper: Mapper) -> usize {
 pub struct Point {
     /// The mapper.
     pub mapper: Mapper,
-    /// Its cost, above zero.
+    /// The mapper's cost, above zero.
     pub cost: f64,
-    /// Its error in texels.
+    /// The mapper's error in texels.
     pub error: f64,
-    /// Whether it is cheapest plane by plane.
+    /// Whether the mapper is cheapest plane by plane.
     pub by_planes: bool,
 }
 
-/// A line in the plot of errors along a column.
+/// A named line in a plot.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// Its name.
+    /// The line's name.
     pub name: String,
-    /// (Pixel, error in texels).
+    /// The points: the pixel and the error in texels, or the span length and the cost.
     pub at: Vec<(f64, f64)>,
 }
 
-/// An axis with a logarithmic or an even scale.
+/// An axis with a logarithmic or a linear scale.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
     from: f64,
     to: f64,
     log: bool,
-    /// Where `from` and `to` are in the drawing.
+    /// The positions of `from` and `to` in the drawing.
     pixels: (i32, i32),
 }
 
 impl Axis {
-    /// An axis that has room for some values beyond them.
+    /// Returns an axis that contains some values. A logarithmic axis has some room on both sides of them.
     fn around(values: impl Iterator<Item = f64>, log: bool, pixels: (i32, i32)) -> Self {
         let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
         for value in values.filter(|value| value.is_finite()) {
@@ -112,7 +112,7 @@ impl Axis {
         (from + (to - from) * self.scale(value)).round() as i32
     }
 
-    /// Round values on the axis: few enough to be told apart.
+    /// Returns round values on the axis, few enough to be read.
     fn ticks(&self) -> Vec<f64> {
         let mut ticks = Vec::new();
         if self.log {
@@ -136,14 +136,14 @@ impl Axis {
             let last = (self.to / step).floor() as i64;
             ticks.extend((first..=last).map(|k| k as f64 * step));
         }
-        // A product of a power of ten may be off by a last bit.
+        // A product with a power of ten can be off by a last bit.
         let (from, to) = (self.from - 1e-9, self.to + 1e-9);
         ticks.retain(|tick| (from..=to).contains(tick));
         ticks
     }
 }
 
-/// A number for an axis.
+/// Returns a number as an axis shows it.
 fn number(value: f64) -> String {
     match value {
         0.0 => "0".into(),
@@ -161,12 +161,12 @@ fn number(value: f64) -> String {
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
-/// What may go wrong while an SVG is put together.
+/// Returns the error of a drawing that fails.
 fn failed(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow!("a plot cannot be drawn: {error}")
 }
 
-/// Text whose left or right end, or middle, is at a place.
+/// Writes a text whose left end, middle or right end is at a position.
 fn write(
     area: &Area<'_>,
     text: &str,
@@ -182,7 +182,7 @@ fn write(
         .map_err(failed)
 }
 
-/// The frame of a plot: title, axes with ticks and their names.
+/// Draws the frame of a plot: the title, the axes, their ticks and their names.
 fn frame(
     area: &Area<'_>,
     title: [&str; 2],
@@ -236,13 +236,14 @@ fn overlap(a: Rect, b: Rect) -> bool {
     a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3]
 }
 
-/// About how wide a text is.
+/// Returns the approximate width of a text.
 fn width(text: &str, size: i32) -> i32 {
     text.chars().count() as i32 * size * 56 / 100 + 2
 }
 
-/// A place for the name of each point, near it and over no other name or point: its left end and
-/// middle; nor over what is to be kept free. Without room anywhere near, right of the point all the same.
+/// Returns a rectangle for the name of each point. The rectangle is near the point and inside `inside`, and
+/// covers no other name, no point and no rectangle of `kept_free`. Without free space nearby, the name goes
+/// to the right of its point.
 fn place_names(
     names: &[String],
     points: &[(i32, i32)],
@@ -254,7 +255,7 @@ fn place_names(
     let mut taken: Vec<Rect> = points.iter().map(|&point| around(point)).collect();
     taken.extend(kept_free);
     let mut order: Vec<usize> = (0..points.len()).collect();
-    // The crowded ones choose first.
+    // The names in the most crowded places choose first.
     let crowd = |i: usize| {
         let near =
             |&&(x, y): &&(i32, i32)| (x - points[i].0).abs() < 90 && (y - points[i].1).abs() < 24;
@@ -265,7 +266,7 @@ fn place_names(
     for i in order {
         let (x, y) = points[i];
         let (w, h) = (width(&names[i], size), size + 2);
-        // Right, left, above, below; then further and further around.
+        // Right, left, above, below; then positions further and further away.
         let mut candidates = vec![
             (x + 10, y),
             (x - 10 - w, y),
@@ -301,11 +302,11 @@ fn place_names(
     places
 }
 
-/// Error against cost: a point a mapper, both scales logarithmic, with the mappers that none
-/// beats in both joined by a line.
+/// Plots error against cost, with a point for each mapper and two logarithmic scales. A line joins the
+/// mappers that no other mapper beats in both.
 ///
 /// # Errors
-/// When the drawing can't be put together.
+/// If the drawing fails.
 pub fn error_against_cost(
     title: [&str; 2],
     names: [&str; 2],
@@ -313,11 +314,11 @@ pub fn error_against_cost(
 ) -> anyhow::Result<String> {
     let (left, right) = (MARGINS[0], WIDTH - MARGINS[1]);
     let (top, bottom) = (MARGINS[2], HEIGHT - MARGINS[3]);
-    // The last bit of a coordinate: less is not told apart.
+    // The last bit of a coordinate: smaller errors cannot be distinguished.
     let error = |point: &Point| point.error.max(1.0 / 65_536.0);
     let x = Axis::around(points.iter().map(|p| p.cost), true, (left, right));
     let mut y = Axis::around(points.iter().map(error), true, (bottom, top));
-    // Room for names above those that err most: they are many, and err alike.
+    // Room for names above the mappers with the largest errors, which are many, with similar errors.
     y.to *= (y.to / y.from).powf(0.06);
     let at = |point: &Point| (x.place(point.cost), y.place(error(point)));
     let mut svg = String::new();
@@ -329,7 +330,7 @@ pub fn error_against_cost(
         let mut steps = Vec::new();
         for i in pareto(&costs) {
             let next = at(&points[i]);
-            // What is between two of them costs as much as the dearer and errs as the cheaper.
+            // A step: at a cost between those of two mappers, the best error is that of the cheaper mapper.
             if let Some(&(_, y)) = steps.last() {
                 steps.push((next.0, y));
             }
@@ -380,7 +381,7 @@ pub fn error_against_cost(
     Ok(svg)
 }
 
-/// The families that there are, the two marks, and the front.
+/// Draws the legend: the families in the plot, the two marks, and the front.
 fn legend(area: &Area<'_>, points: &[Point]) -> anyhow::Result<()> {
     let (mut x, y) = (MARGINS[0], 74);
     for (i, (name, colour)) in FAMILIES.iter().enumerate() {
@@ -407,7 +408,7 @@ fn legend(area: &Area<'_>, points: &[Point]) -> anyhow::Result<()> {
     write(area, "best", (x + 28, y), 12, SOFT, HPos::Left)
 }
 
-/// Colours of lines, apart for every kind of eyes.
+/// Colours of lines that colour-blind readers can distinguish.
 const LINES: [RGBColor; 8] = [
     RGBColor(0xB4, 0x5F, 0x06),
     RGBColor(0x00, 0x72, 0xB2),
@@ -419,10 +420,11 @@ const LINES: [RGBColor; 8] = [
     RGBColor(0x4B, 0x8B, 0xC8),
 ];
 
-/// Lines over one axis, the other scale logarithmic, each with its name at its end or peak.
+/// Plots lines over a common axis, with a logarithmic vertical scale. Values below `least` are drawn at
+/// `least`. Each line's name stands to the right of its end.
 ///
 /// # Errors
-/// When the drawing can't be put together.
+/// If the drawing fails.
 pub fn lines(
     title: [&str; 2],
     names: [&str; 2],
@@ -445,14 +447,15 @@ pub fn lines(
         for (line, colour) in lines.iter().zip(LINES.iter().cycle()) {
             let at = |&(px, value): &(f64, f64)| (x.place(px), y.place(value.max(least)));
             let path: Vec<_> = line.at.iter().map(at).collect();
-            // A name goes to the height of the line's last tenth.
+            // A name goes to the mean height of the line's last tenth.
             let tail = &path[path.len() * 9 / 10..];
             let height = tail.iter().map(|p| p.1).sum::<i32>() / tail.len().max(1) as i32;
             ends.push((height, &line.name, *colour));
             area.draw(&PathElement::new(path, colour.stroke_width(2)))
                 .map_err(failed)?;
         }
-        // From above, each at least a line below the one before; then up again from the bottom.
+        // From the top down, each name is at least one line of text below the one before it; then the names
+        // that are too low move up from the bottom.
         ends.sort_by_key(|end| end.0);
         for i in 1..ends.len() {
             ends[i].0 = ends[i].0.max(ends[i - 1].0 + 17);
@@ -491,7 +494,7 @@ mod tests {
         let mut random = seeded::generator();
         let inside = [60, 60, 1000, 600];
         for _ in 0..20 {
-            // As crowded as the affine loops are: of the same error and nearly the same cost.
+            // As crowded as the affine loops, which have the same error and nearly the same cost.
             let points: Vec<_> = (0..26)
                 .map(|_| (random.i32(100..900), 100 + 90 * random.i32(0..5)))
                 .collect();
@@ -553,7 +556,7 @@ mod tests {
         for (name, ..) in Mapper::ALL {
             assert!(svg.contains(&format!("\n{name}\n")), "{name}");
         }
-        // One mark and the two legends' marks more a family.
+        // Each point is two circles: a white disc, and the mark on it.
         assert!(svg.matches("<circle").count() >= 2 * points.len());
     }
 

@@ -1,6 +1,6 @@
-//! What the seeds claim, beside what is measured here.
+//! The sources' claims, beside the measurements of this run.
 //!
-//! The words are fixed, the figures are of the run.
+//! The texts are fixed; the figures are those of the run.
 
 use modex::HEIGHT;
 use scene::Pose;
@@ -14,20 +14,20 @@ use super::stats::Spread;
 use super::subject::with_poses;
 use super::table::{Table, decibels, percent, texels};
 
-/// A claim and what became of it.
+/// A claim and its measurement.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// Where it is made.
+    /// The source of the claim.
     pub place: &'static str,
     /// The claim.
     pub claimed: &'static str,
-    /// What was measured.
+    /// The measured values.
     pub measured: String,
-    /// Why it differs.
+    /// The reason for the difference.
     pub why: &'static str,
 }
 
-/// Drawing long runs, by the mapper's name.
+/// The times of drawing long spans, by the mapper's name.
 struct Loops<'a>(&'a [Swept]);
 
 impl Loops<'_> {
@@ -48,7 +48,7 @@ impl Loops<'_> {
         }
     }
 
-    /// The cheapest affine column loop.
+    /// Returns the fastest affine column loop, and its time.
     fn best(&self, order: Order) -> Option<(Mapper, f64)> {
         let affine = Mapper::ALL
             .iter()
@@ -63,7 +63,7 @@ const NOT_MEASURED: &str = "not measured: its mappers were left out";
 /// Angles between the screen's axes and the line of constant depth, in tenths of a degree.
 const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
 
-/// The free direction's accuracy at each of `TILTS`, if there is such a mapper.
+/// Returns the accuracy of the mapper `free` at each of `TILTS`, if the mapper exists.
 pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
     let free = Mapper::parse("free")?;
     let entry = Entry::parse("grazing-16")?;
@@ -81,7 +81,7 @@ pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
     Some(tilts.to_vec())
 }
 
-/// Every claim on trial.
+/// Returns every claim with its measurement.
 pub fn trials(
     tables: &[Table],
     swept: &[Swept],
@@ -201,7 +201,7 @@ pub fn trials(
     ]
 }
 
-/// Quadratic pieces of 32 pixels against linear ones of 16, scene by scene.
+/// Compares quadratic pieces of 32 pixels with linear pieces of 16, scene by scene.
 fn quadratic(tables: &[Table]) -> String {
     let mut parts = Vec::new();
     for table in tables {
@@ -232,7 +232,7 @@ fn quadratic(tables: &[Table]) -> String {
     }
 }
 
-/// The trials' cells, the head first.
+/// Returns the cells of the table, the header first.
 pub fn cells(trials: &[Trial]) -> Vec<Vec<String>> {
     let head = ["chapter", "claimed", "measured here", "why"].map(String::from);
     let mut cells = vec![head.to_vec()];
@@ -253,7 +253,7 @@ pub fn cells(trials: &[Trial]) -> Vec<Vec<String>> {
     cells
 }
 
-/// Lines of the screen, which no run is longer than.
+/// The span length of the measurements is the height of the screen: no span of a column is longer.
 const _: () = assert!(LENGTH as usize == HEIGHT);
 
 #[cfg(test)]

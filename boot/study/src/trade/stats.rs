@@ -1,9 +1,9 @@
 //! Statistics of errors and of times.
 
-/// The middle of some numbers; of an even count the mean of the two in the middle.
+/// Returns the median; for an even count, the mean of the two middle values.
 ///
 /// # Panics
-/// Of none.
+/// If `values` is empty.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -14,22 +14,22 @@ pub fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// A median, and the least and the most that it is the median of.
+/// A median, with the smallest and largest of its values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spread {
-    /// The middle one.
+    /// The median.
     pub median: f64,
-    /// The least.
+    /// The smallest value.
     pub least: f64,
-    /// The most.
+    /// The largest value.
     pub most: f64,
 }
 
 impl Spread {
-    /// Of some numbers.
+    /// Returns the spread of some values.
     ///
     /// # Panics
-    /// Of none.
+    /// If `values` is empty.
     pub fn of(values: &[f64]) -> Self {
         Self {
             median: median(values),
@@ -38,15 +38,15 @@ impl Spread {
         }
     }
 
-    /// Half of the way from the least to the most.
+    /// Returns half the distance from the smallest to the largest value.
     pub fn half(&self) -> f64 {
         (self.most - self.least) / 2.0
     }
 
-    /// The geometric mean of some, part by part.
+    /// Returns the geometric mean of some spreads, field by field.
     ///
     /// # Panics
-    /// Of none.
+    /// If `all` is empty.
     pub fn mean(all: &[Self]) -> Self {
         assert!(!all.is_empty(), "a mean of nothing");
         let mean = |part: fn(&Self) -> f64| {
@@ -60,21 +60,22 @@ impl Spread {
         }
     }
 
-    /// From the least to the most, in per cent of the median.
+    /// Returns the distance from the smallest to the largest value, in per cent of the median.
     pub fn percent(&self) -> f64 {
         100.0 * (self.most - self.least) / self.median
     }
 }
 
-/// Classes of errors to an octave: a percentile is told to within 1.1 %.
+/// Classes of errors in an octave: a percentile is accurate to 1.1 %.
 const CLASSES: i32 = 64;
-/// The errors that are told apart: from 2^-20 texel to 2^9.
+/// The range of errors that the classes distinguish: from 2^-20 texel to 2^9.
 const OCTAVES: std::ops::Range<i32> = -20..9;
 
-/// Errors, counted by size, so that those of many pictures fit.
+/// A histogram of errors, so that the errors of many frames fit into memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Errors {
-    /// How many are in each class, the smallest first; below all of them, in the first.
+    /// The number of errors in each class, the smallest errors first. Errors below all classes count in the
+    /// first class.
     classes: Vec<u32>,
     count: u64,
     sum: f64,
@@ -93,10 +94,10 @@ impl Default for Errors {
 }
 
 impl Errors {
-    /// Counts one.
+    /// Adds an error.
     pub fn add(&mut self, error: f64) {
         let above = (error.log2() - f64::from(OCTAVES.start)) * f64::from(CLASSES);
-        // The logarithm of zero is as far below as can be.
+        // The logarithm of zero is minus infinity, which goes into the first class.
         let class = (above.max(0.0) as usize).min(self.classes.len() - 1);
         self.classes[class] += 1;
         self.count += 1;
@@ -104,7 +105,7 @@ impl Errors {
         self.largest = self.largest.max(error);
     }
 
-    /// Counts those of `other`, too.
+    /// Adds the errors of `other`.
     pub fn extend(&mut self, other: &Self) {
         for (class, more) in self.classes.iter_mut().zip(&other.classes) {
             *class += more;
@@ -114,22 +115,23 @@ impl Errors {
         self.largest = self.largest.max(other.largest);
     }
 
-    /// How many there are.
+    /// Returns the number of errors.
     pub fn count(&self) -> u64 {
         self.count
     }
 
-    /// The largest, exactly.
+    /// Returns the largest error, exactly.
     pub fn largest(&self) -> f64 {
         self.largest
     }
 
-    /// The mean, 0 of none.
+    /// Returns the mean error, or 0 without errors.
     pub fn mean(&self) -> f64 {
         self.sum / self.count.max(1) as f64
     }
 
-    /// What `share` of them (0 to 1) are not above, to within a class, rounded up.
+    /// Returns the error that a `share` (0 to 1) of the errors does not exceed, rounded up to the end of its
+    /// class.
     pub fn percentile(&self, share: f64) -> f64 {
         let enough = (share * self.count as f64).ceil() as u64;
         let mut below = 0;
@@ -137,7 +139,7 @@ impl Errors {
             below += u64::from(count);
             if below >= enough {
                 if class as usize == self.classes.len() {
-                    // Whatever is above all classes is counted in the last.
+                    // The last class also holds all errors above it.
                     break;
                 }
                 let octave = f64::from(class) / f64::from(CLASSES) + f64::from(OCTAVES.start);
@@ -148,10 +150,11 @@ impl Errors {
     }
 }
 
-/// Peak signal to noise in decibels of pictures of 8 bits a part; infinite for equal ones.
+/// Returns the peak signal-to-noise ratio of two frames with 8 bits a component, in decibels. It is infinite
+/// for equal frames.
 ///
 /// # Panics
-/// If they have not as many pixels.
+/// If the frames have different numbers of pixels.
 pub fn psnr(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
     assert_eq!(a.len(), b.len(), "one picture has more pixels");
     let pairs = a.as_flattened().iter().zip(b.as_flattened());
@@ -160,8 +163,8 @@ pub fn psnr(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
     10.0 * (255.0f64.powi(2) * parts / squares).log10()
 }
 
-/// Which of some points, each a cost and an error, no other point beats: none is at most as
-/// large in both and smaller in one. By rising cost.
+/// Returns the indices of the points that no other point beats, by rising cost. Each point is a cost and an
+/// error. A point beats another if it is at most as large in both, and smaller in one.
 pub fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
     let mut order: Vec<usize> = (0..points.len()).collect();
     order.sort_by(|&a, &b| {
@@ -213,7 +216,7 @@ mod tests {
             let mut list: Vec<f64> = (0..count)
                 .map(|_| (random.f64() * 26.0 - 18.0).exp2())
                 .collect();
-            // In two parts, put together.
+            // Two histograms, joined.
             let mut second = Errors::default();
             let half = random.usize(..=count);
             list[..half].iter().for_each(|&error| errors.add(error));
@@ -227,7 +230,7 @@ mod tests {
             for share in [0.01, 0.5, 0.99, 1.0] {
                 let exact = list[((share * count as f64).ceil() as usize).max(1) - 1];
                 let told = errors.percentile(share);
-                // Never too good, and not much worse.
+                // Never too small, and at most one class too large.
                 assert!(told >= exact && told <= exact * 1.011, "{told} for {exact}");
             }
         }
@@ -249,7 +252,7 @@ mod tests {
         let black = [[0; 3]; 4];
         assert_eq!(psnr(&black, &black), f64::INFINITY);
         assert_eq!(psnr(&black, &[[255; 3]; 4]), 0.0);
-        // One part of twelve, off by one: 12 x 255^2.
+        // One component of twelve differs by one: 12 x 255^2.
         let mut near = black;
         near[2][1] = 1;
         assert!((psnr(&black, &near) - 10.0 * (12.0 * 65025.0f64).log10()).abs() < 1e-9);
@@ -259,7 +262,7 @@ mod tests {
     fn the_front_is_what_nothing_beats() {
         let mut random = seeded::generator();
         for _ in 0..200 {
-            // Few values: many are equal in one or both.
+            // Only eight values, so that many points are equal in cost, in error or in both.
             let mut point = || (f64::from(random.u8(..8)), f64::from(random.u8(..8)));
             let points: Vec<_> = (0..12).map(|_| point()).collect();
             let beats = |a: (f64, f64), b: (f64, f64)| a.0 <= b.0 && a.1 <= b.1 && a != b;

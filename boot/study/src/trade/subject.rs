@@ -1,19 +1,19 @@
-//! What mappers are measured on: the scenes at some of their poses, and polygons at random.
+//! The subjects that mappers are measured on: scenes at several poses, and random polygons.
 
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{Corner, FOCAL_LENGTH, Face as MeshFace, Mesh, Pose, Scene, Stage, Storage, Vec3};
 use texmap::plane::Anchor;
 use texmap::{Face, Texture, Vertex};
 
-/// The name of the scene of polygons at random.
+/// The name of the scene of random polygons.
 pub const RANDOM: &str = "random";
-/// Polygons of the random scene.
+/// The number of polygons of the random scene.
 const POLYGONS: usize = 200;
 
-/// The ticks that are looked at: a twelfth of a turn from each other and an odd bit.
+/// The ticks of the measured frames: a twelfth of a turn and one tick apart.
 pub const TICKS: [u32; 4] = [0, 61, 122, 183];
 
-/// A face with a polygon of its own.
+/// A face that owns its polygon.
 #[derive(Clone, Debug)]
 pub struct Owned {
     polygon: Vec<Vertex>,
@@ -32,7 +32,7 @@ impl Owned {
         }
     }
 
-    /// A face from its parts.
+    /// Returns a face with a polygon and three anchors of its texture plane.
     pub fn from_parts(polygon: Vec<Vertex>, anchors: [Anchor; 3]) -> Self {
         Self {
             polygon,
@@ -42,7 +42,7 @@ impl Owned {
         }
     }
 
-    /// As the mappers take it.
+    /// Returns the face in the form that the mappers accept.
     pub fn face(&self) -> Face<'_> {
         Face {
             polygon: &self.polygon,
@@ -56,17 +56,17 @@ impl Owned {
 /// A scene to measure on.
 #[derive(Debug)]
 pub struct Subject<'a> {
-    /// Its name.
+    /// The scene's name.
     pub name: &'static str,
-    /// A line about it.
+    /// A line about the scene.
     pub about: String,
-    /// The faces of each picture.
+    /// The faces of each frame.
     pub pictures: Vec<Vec<Owned>>,
     /// The textures of the faces, lit.
     pub textures: Vec<Texture<'a>>,
-    /// The DAC's colours, 8 bits a part.
+    /// The DAC's colours, with 8 bits a component.
     pub palette: [[u8; 3]; 256],
-    /// The colour of each scan line where there is no solid.
+    /// The background colour of each scan line.
     pub background: [u8; modex::HEIGHT],
 }
 
@@ -91,17 +91,17 @@ impl<'a> Subject<'a> {
         }
     }
 
-    /// A texture by the number that a face or a job has.
+    /// Returns a texture by the number that a face or a job has.
     pub fn texture(&self, number: u16) -> &Texture<'a> {
         &self.textures[usize::from(number)]
     }
 }
 
-/// Scenes that are there to be looked at: what they require (hidden surfaces, tiles, mipmaps) costs
-/// the same under every mapper.
+/// Scenes that are not measured: the features that they show (hidden surfaces, tiles, mipmaps) cost the same
+/// under every mapper.
 const NOT_MEASURED: [&str; 3] = ["knot", "corridor", "moire"];
 
-/// The names of all subjects.
+/// Returns the names of all subjects.
 pub fn names() -> impl Iterator<Item = &'static str> {
     let names = CATALOGUE.iter().map(|entry| entry.name);
     names
@@ -109,10 +109,10 @@ pub fn names() -> impl Iterator<Item = &'static str> {
         .chain([RANDOM])
 }
 
-/// Makes the subject of a name, and lends it. `seed` is the random scene's.
+/// Makes the subject of a name, and passes it to `look`. `seed` is the random scene's.
 ///
 /// # Panics
-/// If there is no such scene.
+/// If no scene has the name.
 pub fn with<T>(name: &str, seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     if name == RANDOM {
         return with_random(seed, look);
@@ -121,12 +121,12 @@ pub fn with<T>(name: &str, seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T
     with_entry(entry, look)
 }
 
-/// Makes a subject of a scene, and lends it.
+/// Makes a subject of a scene at [`TICKS`], and passes it to `look`.
 pub fn with_entry<T>(entry: &Entry<'_>, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     with_poses(entry, &TICKS.map(|tick| entry.pose(tick)), look)
 }
 
-/// Makes a subject of a scene at some poses, and lends it.
+/// Makes a subject of a scene at some poses, and passes it to `look`.
 pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = in_place::boxed!(Storage);
@@ -136,7 +136,8 @@ pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subje
     look(&Subject::new(entry.name, about, &mut stage, poses))
 }
 
-/// The colours and the texture of a scene, and a mesh of its own.
+/// Makes the random subject, with the colours and the texture of the scene `tilted`, and passes it to
+/// `look`.
 fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = in_place::boxed!(Storage);
@@ -165,12 +166,12 @@ fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     look(&Subject::new(RANDOM, about, &mut stage, &[pose]))
 }
 
-/// Parallelograms before the eye that look at it, from near to far, with the texture over each.
+/// Returns parallelograms that face the eye, from near to far, each with the whole texture.
 fn random_mesh(seed: u64) -> (Vec<Vec3>, Vec<Corner>, Vec<MeshFace>) {
     let mut random = fastrand::Rng::with_seed(seed);
     let (mut vertices, mut corners, mut faces) = (Vec::new(), Vec::new(), Vec::new());
     while faces.len() < POLYGONS {
-        // From half a unit to 32, each distance that is twice as far as likely as the one before.
+        // From half a unit to 32 units; each doubling of the distance is equally likely.
         let distance = (random.f64() * 6.0 - 1.0).exp2();
         let mut around = |size: f64| (random.f64() * 2.0 - 1.0) * size * distance;
         let middle = [around(0.6), around(0.45), distance];
@@ -189,7 +190,7 @@ fn random_mesh(seed: u64) -> (Vec<Vec3>, Vec<Corner>, Vec<MeshFace>) {
         });
         let facing: f64 = (0..3).map(|k| cross[k] * middle[k]).sum();
         let length = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
-        // Turned over when it looks away; the ones that are hardly seen are left out.
+        // A parallelogram that faces away is turned over below. One that is seen almost edge-on is left out.
         if facing.abs() < 0.02 * length * distance {
             continue;
         }
@@ -219,7 +220,7 @@ fn random_mesh(seed: u64) -> (Vec<Vec3>, Vec<Corner>, Vec<MeshFace>) {
     (vertices, corners, faces)
 }
 
-/// The side of the catalogue's largest textures.
+/// Returns the side of the catalogue's largest textures.
 const fn textures_side() -> usize {
     MAX_TEXELS.isqrt()
 }
@@ -247,7 +248,7 @@ mod tests {
         let polygons = |seed| {
             with(RANDOM, seed, |subject| {
                 let faces = &subject.pictures[0];
-                // Some are off the screen's middle; none is lost to its back.
+                // A few are off the screen, but none is lost because it faces away.
                 assert!(faces.len() > POLYGONS * 9 / 10, "{}", faces.len());
                 faces
                     .iter()

@@ -9,24 +9,24 @@ use super::clock;
 use super::cost::{Cost, Costs, Swept};
 use super::stats::Spread;
 
-/// A mapper's figures on a scene, or on all of them.
+/// A mapper's figures on one scene, or on all scenes.
 #[derive(Clone, Debug)]
 pub struct Row {
     /// The mapper.
     pub mapper: Mapper,
-    /// Its accuracy.
+    /// The mapper's accuracy.
     pub accuracy: Accuracy,
-    /// Its cost in each of [`ORDERS`](super::cost::ORDERS).
+    /// The mapper's cost in each of [`ORDERS`](super::cost::ORDERS).
     pub costs: Vec<Costs>,
 }
 
 impl Row {
-    /// The name of the mapper.
+    /// Returns the name of the mapper.
     pub fn name(&self) -> String {
         self.mapper.to_string()
     }
 
-    /// The order in which whole pictures are drawn fastest, and its costs.
+    /// Returns the costs in the order that draws whole frames fastest.
     ///
     /// # Panics
     /// If the row has no costs.
@@ -36,7 +36,7 @@ impl Row {
         best.expect("there is an order")
     }
 
-    /// The costs in an order.
+    /// Returns the costs in an order.
     ///
     /// # Panics
     /// If the order was not measured.
@@ -46,19 +46,19 @@ impl Row {
     }
 }
 
-/// All mappers on a scene.
+/// The figures of all mappers on a scene.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// The scene's name.
     pub scene: String,
-    /// A line about it.
+    /// A line about the scene.
     pub about: String,
-    /// A row a mapper.
+    /// A row for each mapper.
     pub rows: Vec<Row>,
 }
 
 impl Table {
-    /// The tables of several scenes as one: errors together, costs as geometric means.
+    /// Joins the tables of several scenes: errors together, costs as geometric means.
     pub fn all(tables: &[Self]) -> Self {
         let mut rows = Vec::new();
         let mappers = tables.first().map_or(&[][..], |table| &table.rows);
@@ -107,7 +107,7 @@ impl Table {
         }
     }
 
-    /// The table's head and its rows, cell by cell.
+    /// Returns the table's header and rows, cell by cell.
     pub fn cells(&self) -> Vec<Vec<String>> {
         let mut head: Vec<String> = ["mapper", "largest", "99 %", "mean", "other texels", "PSNR"]
             .map(String::from)
@@ -145,7 +145,7 @@ impl Table {
             line.push(format!("{:.2}", row.best().picture.to_packed.median));
             let twins = row.costs.iter().enumerate();
             for (k, twin) in twins.filter_map(|(k, costs)| Some((k, costs.twin?))) {
-                // After the accuracy's columns, those of the loops.
+                // The columns of the loops follow the six columns of the name and the accuracy.
                 line[6 + k] += &format!("; {:.2} without BMI2", twin.time.median);
             }
             cells.push(line);
@@ -154,7 +154,7 @@ impl Table {
     }
 }
 
-/// Lines of cells as a Markdown table, the first column to the left and the rest to the right.
+/// Returns rows of cells as a Markdown table, with the first column aligned left and the others right.
 pub fn markdown(cells: &[Vec<String>]) -> String {
     let mut text = String::new();
     for (i, line) in cells.iter().enumerate() {
@@ -171,7 +171,7 @@ pub fn markdown(cells: &[Vec<String>]) -> String {
     text
 }
 
-/// Texels with as many digits as mean something.
+/// Returns an error in texels, with its significant digits.
 pub fn texels(error: f64) -> String {
     match error {
         0.0 => "0".into(),
@@ -181,12 +181,12 @@ pub fn texels(error: f64) -> String {
         0.1.. => format!("{error:.3}"),
         0.01.. => format!("{error:.4}"),
         0.0001.. => format!("{error:.5}"),
-        // The last bit of a coordinate.
+        // Enough digits for the last bit of a coordinate.
         _ => format!("{error:.6}"),
     }
 }
 
-/// A share in per cent.
+/// Returns a share in per cent.
 pub fn percent(share: f64) -> String {
     match 100.0 * share {
         0.0 => "0".into(),
@@ -196,7 +196,7 @@ pub fn percent(share: f64) -> String {
     }
 }
 
-/// Decibels; equal pictures have no noise.
+/// Returns decibels, or `equal` for frames without a difference.
 pub fn decibels(psnr: f64) -> String {
     match psnr.is_finite() {
         true => format!("{psnr:.1} dB"),
@@ -204,7 +204,7 @@ pub fn decibels(psnr: f64) -> String {
     }
 }
 
-/// Lines of cells for programs.
+/// Returns rows of cells as CSV.
 pub fn plain_csv(cells: &[Vec<String>]) -> String {
     let line = |cells: &Vec<String>| {
         let fields: Vec<_> = cells.iter().map(|cell| field(cell)).collect();
@@ -213,7 +213,7 @@ pub fn plain_csv(cells: &[Vec<String>]) -> String {
     cells.iter().map(line).collect()
 }
 
-/// All figures: a line a scene, mapper and order.
+/// Returns all figures as CSV: a line for each scene, mapper and order.
 pub fn csv(tables: &[Table]) -> String {
     let mut text =
         String::from("scene,mapper,order,unit,pixels,largest_error,p99_error,mean_error");
@@ -266,7 +266,7 @@ pub fn csv(tables: &[Table]) -> String {
     text
 }
 
-/// The sweeps over run lengths and angles.
+/// Returns the sweeps over span lengths and angles as CSV.
 pub fn sweep_csv(swept: &[Swept]) -> String {
     let mut text = String::from("length,angle,mapper,order,unit,time,time_least,time_most");
     text += ",time_to_bare,time_to_packed\n";
@@ -291,7 +291,7 @@ pub fn sweep_csv(swept: &[Swept]) -> String {
     text
 }
 
-/// A field of a CSV file, quoted where it has to be.
+/// Returns a field of a CSV file, quoted if necessary.
 fn field(text: &str) -> String {
     match text.contains(['"', ',', '\n', '\r']) {
         true => format!("\"{}\"", text.replace('"', "\"\"")),
@@ -303,7 +303,7 @@ fn field(text: &str) -> String {
 pub(super) mod tests {
     use super::*;
 
-    /// A table with figures of no meaning.
+    /// Returns a table with figures of no meaning.
     pub fn made_up(scene: &str, scale: f64) -> Table {
         let mut rows = Vec::new();
         for (i, &(_, mapper, _)) in Mapper::ALL.iter().enumerate() {
