@@ -1,6 +1,6 @@
-//! The machine's edge, for every program of the bare machine: the show, and the one that measures.
+//! Hardware access for every program of the bare machine: the demo, and the bench kernel.
 //!
-//! [`machine`] reaches the devices. What needs no device is beside it and is tested on the host.
+//! [`machine`] accesses the devices. The code beside it needs no device, and is tested on the host.
 #![cfg_attr(target_os = "none", no_std)]
 
 pub mod machine;

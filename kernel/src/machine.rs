@@ -1,4 +1,4 @@
-//! The machine's edge: everything that is reached through ports, physical memory or interrupts.
+//! Hardware access: everything that is reached through ports, physical memory or interrupts.
 
 pub mod clock;
 mod cpu;
@@ -19,30 +19,30 @@ use modex::SetError;
 
 pub use vga::Window;
 
-/// Where the card's window lies in physical memory.
+/// Physical address of the card's window.
 const WINDOW: u64 = 0xA_0000;
 
-/// What a program of this machine asks of the boot loader.
+/// The boot loader's configuration for the programs of this machine.
 pub const BOOT: BootloaderConfig = {
     let mut config = BootloaderConfig::new_default();
-    // The boot loader maps no video memory by itself: it lies in the physical memory at A0000h.
+    // The boot loader does not map video memory unless asked. It is at A0000h in physical memory.
     config.mappings.physical_memory = Some(Mapping::Dynamic);
     config
 };
 
-/// The machine, ready: exceptions are reported, ticks count, serial line and keyboard work.
+/// The initialized machine: exceptions are reported, ticks count, serial line and keyboard work.
 #[derive(Debug)]
 pub struct Machine {
     /// The VGA.
     pub vga: Window,
-    /// What the boot loader has read of the image's ramdisk, if it has one.
+    /// The image's ramdisk, as the boot loader has read it; `None` if the image has none.
     pub ramdisk: Option<&'static [u8]>,
 }
 
-/// Makes the machine ready. Called once, at the start.
+/// Initializes the machine. Called once, at the start.
 pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     serial::init();
-    // Firmware may have left something on the line.
+    // Firmware may have left part of a line.
     serial::cancel_line();
     serial::line(format_args!(
         "{HELLO} crystal-ball {} protocol {PROTOCOL}",
@@ -57,19 +57,19 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
         .into_option()
         .expect("the boot loader was asked to map the physical memory");
     let base = NonNull::new((offset + WINDOW) as *mut u8).expect("the window is not at zero");
-    // SAFETY: the boot loader maps all physical memory at `offset`, the card's window with it,
-    // for as long as the kernel runs; no other pointer is made to it.
+    // SAFETY: the boot loader maps all physical memory at `offset`, including the card's window, for as long
+    // as the kernel runs. No other pointer to the window is made.
     let vga = unsafe { Window::new(base) };
     let ramdisk = boot_info.ramdisk_addr.into_option().map(|address| {
-        // SAFETY: the boot loader maps the ramdisk there, as many bytes of it, for as long as the
-        // kernel runs; nothing else points to it, and nobody writes it.
+        // SAFETY: the boot loader maps `ramdisk_len` bytes of the ramdisk at this address for as long as the
+        // kernel runs. Nothing else points to the bytes, and no code writes them.
         unsafe { core::slice::from_raw_parts(address as *const u8, boot_info.ramdisk_len as usize) }
     });
     Machine { vga, ramdisk }
 }
 
-/// Sleeps until an interrupt: a tick, a byte on the serial line, or a key. `idle` is asked with
-/// interrupts off, so nothing that arrives in between is slept through.
+/// Sleeps until an interrupt: a tick, a byte on the serial line, or a key. Returns at once if `idle` returns
+/// false. `idle` is called with interrupts off, so an interrupt that arrives after it still ends the sleep.
 pub fn sleep_while(idle: impl FnOnce() -> bool) {
     x86_64::instructions::interrupts::disable();
     if idle() {
@@ -79,14 +79,14 @@ pub fn sleep_while(idle: impl FnOnce() -> bool) {
     }
 }
 
-/// Does something that no interrupt gets in between of.
+/// Runs `work` with interrupts off.
 pub fn undisturbed<T>(work: impl FnOnce() -> T) -> T {
     x86_64::instructions::interrupts::without_interrupts(work)
 }
 
-/// Ends QEMU with `exit`'s code; on a machine without its exit device, stops for good.
+/// Ends QEMU with `exit`'s code. A machine without QEMU's exit device stops for good.
 pub fn exit(exit: Exit) -> ! {
-    // SAFETY: on a PC nothing but QEMU's exit device answers at this port.
+    // SAFETY: on a PC no device except QEMU's exit device answers at this port.
     unsafe { ports::out32(Exit::PORT, exit as u32) };
     // QEMU ends some instructions later.
     stop()
@@ -100,7 +100,7 @@ pub fn stop() -> ! {
     }
 }
 
-/// Breaks in the way that was asked for.
+/// Fails in the requested way.
 pub fn fail(fault: link::Fault) -> ! {
     match fault {
         link::Fault::Panic => panic!("asked to, by 'fail panic'"),
@@ -108,7 +108,7 @@ pub fn fail(fault: link::Fault) -> ! {
         link::Fault::PageFault => cpu::page_fault(),
         link::Fault::StackOverflow => cpu::stack_overflow(),
         link::Fault::TripleFault => cpu::triple_fault(),
-        // What mode set returns where RAM lies in place of the window.
+        // The error that setting the mode returns if RAM is in place of the window.
         link::Fault::Adapter => report::adapter(SetError::Plane {
             plane: 0,
             at: 0,

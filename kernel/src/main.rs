@@ -1,13 +1,13 @@
 //! The kernel: Crystal Ball on the bare machine.
 //!
-//! It is the machine's edge, and no more: ports, video memory, interrupts, the serial line, all in
-//! [`machine`] and with all of the kernel's `unsafe`. The program that draws pictures and answers
-//! commands is the crate [`show`], which runs on the host as well. Whatever goes wrong is reported
-//! on the serial line in words and ends QEMU with a code of its own; the kernel never restarts by
-//! itself.
+//! The kernel contains only the access to the hardware: ports, video memory, interrupts and the serial line.
+//! All of that is in [`machine`], with all of this crate's `unsafe` code. The crate [`show`] draws frames and
+//! answers commands, and runs on the host as well. A panic, a CPU exception or an unfit display adapter is
+//! reported as text on the serial line and ends QEMU with a code for its kind. The kernel never restarts on
+//! its own.
 //!
-//! All of it compiles for the host as well, where it says what to do instead; only the entry
-//! point and the panic handler are the bare machine's. So clippy and editors see every line.
+//! The kernel also compiles for the host, where it prints how to run it instead. Only the entry point and the
+//! panic handler are limited to the bare machine, so clippy and editors see every other line.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use bootloader_api::{BootInfo, BootloaderConfig};
@@ -20,7 +20,7 @@ use spin::Mutex;
 /// The fixed memory of the program.
 static MEMORY: Mutex<Memory> = Mutex::new(Memory::new());
 
-/// What the kernel asks of the boot loader.
+/// The boot loader's configuration.
 static BOOT: BootloaderConfig = machine::BOOT;
 
 fn start(boot_info: &'static mut BootInfo) -> ! {
@@ -60,8 +60,8 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     }
 }
 
-/// The ramdisk's pack, which is told on the serial line. One that is none is told as well, and why:
-/// the built-in scenes are there all the same.
+/// Returns the ramdisk's pack, and writes its checksum. A damaged pack is reported with its reason; the
+/// built-in scenes still work.
 fn taken(ramdisk: &'static [u8]) -> Option<Pack<'static>> {
     match Pack::parse(ramdisk) {
         Ok(pack) => {
@@ -86,7 +86,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    // The kernel's code is reached from here too, so that the host's compiler checks all of it.
+    // Reaching the kernel's code from here makes the host's compiler check all of it.
     let kernel: (fn(&'static mut BootInfo) -> !, _) = (start, &BOOT);
     let report = machine::report::panic;
     core::hint::black_box((kernel, report));

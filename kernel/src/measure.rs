@@ -1,8 +1,8 @@
-//! The measuring kernel: what drawing costs on the bare machine.
+//! The bench kernel: measures what drawing costs on the bare machine.
 //!
-//! A program beside the show, from the same crates and with an image of its own. The crate [`cost`]
-//! does the work, and names what can be asked for; here are the machine's card, its time stamp
-//! counter and its serial line. Interrupts are off from an ask to the end of its answer.
+//! It is a separate program beside the demo, built from the same crates and put into a separate image. The
+//! crate [`cost`] does the work and names what can be requested. This file adds the machine's card, its time
+//! stamp counter and its serial line. Interrupts are off from a request to the end of its answer.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use bootloader_api::{BootInfo, BootloaderConfig};
@@ -13,7 +13,7 @@ use spin::Mutex;
 /// The fixed memory of the program.
 static MEMORY: Mutex<Memory> = Mutex::new(Memory::new());
 
-/// What the kernel asks of the boot loader.
+/// The boot loader's configuration.
 static BOOT: BootloaderConfig = machine::BOOT;
 
 fn start(boot_info: &'static mut BootInfo) -> ! {
@@ -51,7 +51,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 
 #[cfg(not(target_os = "none"))]
 fn main() {
-    // The kernel's code is reached from here too, so that the host's compiler checks all of it.
+    // Reaching the kernel's code from here makes the host's compiler check all of it.
     let kernel: (fn(&'static mut BootInfo) -> !, _) = (start, &BOOT);
     let report = machine::report::panic;
     core::hint::black_box((kernel, report));

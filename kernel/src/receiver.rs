@@ -1,14 +1,15 @@
-//! Received bytes on their way from the UART to the program.
+//! The way of received bytes from the UART to the program.
 //!
-//! The UART's FIFO holds 16 bytes: 1.4 ms at 115 200 baud, and a frame takes longer. The interrupt
-//! handler moves the bytes from the FIFO into a [`Ring`], which the program empties between frames.
+//! The UART's FIFO holds 16 bytes, which arrive in 1.4 ms at 115 200 baud; drawing a frame takes longer. So
+//! the interrupt handler moves the bytes from the FIFO into a [`Ring`], which the program empties between
+//! frames.
 //!
-//! When the ring is full the handler leaves the bytes in the FIFO and switches the UART's interrupt
-//! off; the program switches it on again when half of the ring is free. QEMU then waits with the
-//! bytes that follow, so nothing is lost. A real UART overruns its FIFO and reports that.
+//! When the ring is full, the handler leaves the bytes in the FIFO and switches the UART's interrupt off. The
+//! program switches it on again when half of the ring is free. QEMU holds back the bytes that follow, so
+//! nothing is lost. A real UART overruns its FIFO and reports that.
 //!
-//! A line with a lost or damaged byte must never be carried out, not even the half of it that
-//! arrived. [`Received::damaged`] marks the bytes that may stand beside a loss.
+//! A line with a lost or damaged byte must never be carried out, not even the half of it that arrived.
+//! [`Received::damaged`] marks the bytes that may be next to a loss.
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
@@ -20,21 +21,21 @@ const DATA_READY: u8 = 0x01;
 const OVERRUN: u8 = 0x02;
 /// Line Status bits 2 to 4: the next byte has a parity error, a framing error, or is a break.
 const DAMAGED: u8 = 0x1C;
-/// Line Status bit 5: the transmitter takes bytes.
+/// Line Status bit 5: the transmitter accepts bytes.
 const TRANSMITTER_READY: u8 = 0x20;
-/// The value that a port without a device reads. A UART never sets bit 7 without a FIFO error, and
-/// never all bits.
+/// The value that a port without a device reads. A UART sets bit 7 only with a FIFO error, and never sets all
+/// bits.
 const NOTHING: u8 = 0xFF;
 /// Bytes that the receiver's FIFO holds.
 const FIFO: u8 = 16;
 /// Set in a ring's item if the byte is damaged.
 const MARK: u16 = 0x100;
 
-/// How a UART is reached.
+/// Access to a UART's registers.
 pub trait Uart {
     /// Reads Line Status. The read clears the UART's error bits.
     fn line_status(&mut self) -> u8;
-    /// Takes the oldest byte from the FIFO.
+    /// Removes the oldest byte from the FIFO and returns it.
     fn data(&mut self) -> u8;
     /// Switches the interrupt for received bytes on or off.
     fn set_interrupt(&mut self, on: bool);
@@ -53,7 +54,7 @@ pub struct Received {
 #[derive(Debug)]
 pub struct Receiver<const SIZE: usize> {
     ring: Ring<SIZE>,
-    /// The next so many bytes are marked as damaged.
+    /// Number of following bytes that are marked as damaged.
     suspect: AtomicU8,
     /// The UART's interrupt is off, because the ring was full.
     paused: AtomicBool,
@@ -63,7 +64,7 @@ pub struct Receiver<const SIZE: usize> {
 }
 
 impl<const SIZE: usize> Receiver<SIZE> {
-    /// Nothing received.
+    /// Returns a receiver that has received nothing.
     pub const fn new() -> Self {
         Self {
             ring: Ring::new(),
@@ -75,11 +76,11 @@ impl<const SIZE: usize> Receiver<SIZE> {
         }
     }
 
-    /// The interrupt handler's part: moves bytes from the FIFO into the ring, until the FIFO is empty
-    /// or the ring is full. It must come that far: the interrupt controller sees only the edge when
-    /// the UART's request begins.
+    /// The interrupt handler's part: moves bytes from the FIFO into the ring, until the FIFO is empty or the
+    /// ring is full. It must go that far, because the interrupt controller sees only the edge at which the
+    /// UART's request begins.
     pub fn take(&self, uart: &mut impl Uart) {
-        // Fullness comes first: reading Line Status forgets what it says of the next byte.
+        // Check for a full ring first: reading Line Status clears the errors of the next byte.
         while !self.ring.is_full() {
             let status = uart.line_status();
             if status == NOTHING {
@@ -94,7 +95,7 @@ impl<const SIZE: usize> Receiver<SIZE> {
             self.suspect
                 .store(suspect.saturating_sub(1), Ordering::Relaxed);
             let mark = if suspect > 0 { MARK } else { 0 };
-            // The handler alone stores, and there was room.
+            // The push succeeds: only the handler stores, and the ring had room.
             let _ = self.ring.push(byte | mark);
         }
         self.pauses.fetch_add(1, Ordering::Relaxed);
@@ -102,11 +103,11 @@ impl<const SIZE: usize> Receiver<SIZE> {
         uart.set_interrupt(false);
     }
 
-    /// The program's part: the oldest byte in the ring.
+    /// The program's part: removes the oldest byte from the ring and returns it.
     pub fn fetch(&self, uart: &mut impl Uart) -> Option<Received> {
         let item = self.ring.pop();
         if self.paused.load(Ordering::Relaxed) && self.ring.len() <= SIZE / 2 {
-            // The handler does not run before the next line: its interrupt is off.
+            // The handler cannot run until `set_interrupt`, because its interrupt is off.
             self.paused.store(false, Ordering::Relaxed);
             uart.set_interrupt(true);
         }
@@ -116,27 +117,27 @@ impl<const SIZE: usize> Receiver<SIZE> {
         })
     }
 
-    /// Whether the ring holds bytes.
+    /// Returns whether the ring holds bytes.
     pub fn has_received(&self) -> bool {
         !self.ring.is_empty()
     }
 
-    /// Whether the transmitter takes bytes. Who sends has to ask here: Line Status forgets an error
-    /// when it is read. Called with interrupts off, so that the handler takes no byte between the read
-    /// and the note of it.
+    /// Returns whether the transmitter accepts bytes. Senders must ask here, because reading Line Status
+    /// clears its errors. Called with interrupts off, so that the handler moves no byte between the read and
+    /// the note of its errors.
     pub fn can_send(&self, uart: &mut impl Uart) -> bool {
         let status = uart.line_status();
         self.note(status);
         status & TRANSMITTER_READY != 0
     }
 
-    /// Notes the errors in a value of Line Status.
+    /// Counts the errors in a value of Line Status, and marks the bytes that they affect.
     fn note(&self, status: u8) {
         if status & OVERRUN != 0 {
             self.overruns.fetch_add(1, Ordering::Relaxed);
-            // The FIFO was full when the byte was lost, and nothing was taken from it since: the gap
-            // lies behind the bytes that it holds, before the one that follows. A UART without a FIFO
-            // lost the byte before its next one. All of them are marked.
+            // The FIFO was full when the byte was lost, and no byte was removed from it since. The gap is
+            // therefore after the bytes that the FIFO holds and before the byte that follows. A UART without
+            // a FIFO lost the byte before its next byte. All of these bytes are marked.
             self.suspect.store(FIFO + 1, Ordering::Relaxed);
         }
         if status & DAMAGED != 0 {
@@ -145,7 +146,7 @@ impl<const SIZE: usize> Receiver<SIZE> {
         }
     }
 
-    /// Times that the UART lost bytes, since its FIFO was full.
+    /// Times that the UART lost bytes because its FIFO was full.
     pub fn overruns(&self) -> u32 {
         self.overruns.load(Ordering::Relaxed)
     }
@@ -173,13 +174,13 @@ mod tests {
     use link::Lines;
     use std::collections::VecDeque;
 
-    /// A UART with a FIFO of 16 bytes, as its datasheet says.
+    /// A UART with a FIFO of 16 bytes, as its datasheet describes it.
     #[derive(Default)]
     struct Model {
         fifo: VecDeque<(u8, u8)>,
         overrun: u8,
         on: bool,
-        /// Who sends waits while the FIFO is full, as QEMU does.
+        /// The sender waits while the FIFO is full, as QEMU does.
         waits: bool,
         /// The transmitter is busy.
         busy: bool,
@@ -194,7 +195,7 @@ mod tests {
             }
         }
 
-        /// A byte arrives on the wire; with `errors` in the bits of Line Status.
+        /// A byte arrives on the wire, with `errors` in the bits of Line Status.
         fn arrive(&mut self, byte: u8, errors: u8) {
             if self.fifo.len() < usize::from(FIFO) {
                 self.fifo.push_back((byte, errors));
@@ -204,7 +205,7 @@ mod tests {
             }
         }
 
-        /// The request to the interrupt controller, at a trigger level of 8 bytes.
+        /// Returns whether the UART requests an interrupt, at a trigger level of 8 bytes.
         fn requests(&self) -> bool {
             self.on && self.fifo.len() >= 8
         }
@@ -244,7 +245,8 @@ mod tests {
         }
     }
 
-    /// 115 200 baud without a pause through a frame of 300 ms, which fetches nothing: 3 456 bytes.
+    /// 115 200 baud without a pause during a frame of 300 ms, in which the program fetches nothing: 3 456
+    /// bytes.
     #[test]
     fn a_burst_during_a_long_frame_loses_nothing() {
         let sent: Vec<String> = (0..216).map(|n| format!("show {n:010}")).collect();
@@ -258,7 +260,7 @@ mod tests {
                 receiver.take(&mut uart);
             }
         }
-        // The FIFO's time-out.
+        // The FIFO's time-out delivers the rest.
         receiver.take(&mut uart);
         let (mut lines, mut heard) = (Lines::new(), Vec::new());
         fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
@@ -268,7 +270,7 @@ mod tests {
         assert!(!receiver.has_received());
     }
 
-    /// Whoever waits while the FIFO is full loses nothing, however small the ring is.
+    /// A sender that waits while the FIFO is full loses nothing, however small the ring is.
     #[test]
     fn a_full_ring_holds_the_sender_up() {
         let receiver = Receiver::<16>::new();
@@ -316,7 +318,7 @@ mod tests {
             assert_eq!(receiver.fetch(&mut uart).map(|r| r.byte), Some(byte));
             assert_eq!(uart.on, byte >= 7, "after {byte}");
         }
-        // Nobody else switches it.
+        // Only a pause lets the program switch the interrupt on.
         uart.on = false;
         assert_eq!(receiver.fetch(&mut uart), None);
         assert!(!uart.on);
@@ -338,7 +340,7 @@ mod tests {
         }
     }
 
-    /// Whichever bytes a UART loses, no line that they are missing from is heard as a line.
+    /// Whichever bytes a UART loses, no line that misses one of them is accepted.
     #[test]
     fn a_line_with_a_lost_byte_is_refused_by_name() {
         let mut random = seeded::generator();
@@ -355,12 +357,12 @@ mod tests {
                 for &byte in line.as_bytes().iter().chain(b"\n") {
                     uart.arrive(byte, 0);
                     lost |= uart.overrun != 0;
-                    // The handler comes late, and the program later.
+                    // The handler runs late, and the program later still.
                     if random.u8(..12) == 0 {
                         receiver.take(&mut uart);
                     }
                     if random.u8(..40) == 0 {
-                        // Sending reads Line Status, too.
+                        // Sending reads Line Status too.
                         assert!(receiver.can_send(&mut uart));
                         fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
                     }
@@ -370,7 +372,7 @@ mod tests {
             let mut rest = sent.iter();
             for line in &heard {
                 match line {
-                    // Whole, and in order.
+                    // Accepted lines are complete and in order.
                     Ok(line) => assert!(rest.any(|sent| sent == line), "'{line}' was not sent"),
                     Err(why) => {
                         assert_eq!(

@@ -1,24 +1,24 @@
-//! A ring between an interrupt handler and the program.
+//! A ring buffer between an interrupt handler and the program.
 
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 
 /// A queue of up to `SIZE` items for a single producer and a single consumer. `SIZE` is a power of
 /// two, so that the two counters may wrap.
 ///
-/// The producer is an interrupt handler and the consumer is the program that it interrupts, or they
-/// are two threads: neither waits for the other. The ring stays in order only if one caller at a time
-/// calls [`Ring::push`], and one calls [`Ring::pop`].
+/// The producer is an interrupt handler and the consumer is the program that it interrupts, or they are two
+/// threads: neither waits for the other. The ring keeps its order only if one caller at a time calls
+/// [`Ring::push`], and one at a time calls [`Ring::pop`].
 #[derive(Debug)]
 pub struct Ring<const SIZE: usize> {
     items: [AtomicU16; SIZE],
-    /// Items stored so far. The producer alone writes it.
+    /// Items stored so far. Only the producer writes it.
     stored: AtomicU32,
-    /// Items fetched so far. The consumer alone writes it.
+    /// Items fetched so far. Only the consumer writes it.
     fetched: AtomicU32,
 }
 
 impl<const SIZE: usize> Ring<SIZE> {
-    /// An empty ring.
+    /// Returns an empty ring.
     pub const fn new() -> Self {
         const { assert!(SIZE.is_power_of_two() && SIZE <= 1 << 16) }
         Self {
@@ -36,36 +36,36 @@ impl<const SIZE: usize> Ring<SIZE> {
         }
         let stored = self.stored.load(Ordering::Relaxed);
         self.items[stored as usize % SIZE].store(item, Ordering::Relaxed);
-        // The consumer sees the item before it sees the count.
+        // Release: the consumer sees the item before it sees the count.
         self.stored.store(stored.wrapping_add(1), Ordering::Release);
         true
     }
 
-    /// Fetches the oldest item.
+    /// Removes the oldest item and returns it, or `None` if the ring is empty.
     pub fn pop(&self) -> Option<u16> {
         if self.is_empty() {
             return None;
         }
         let fetched = self.fetched.load(Ordering::Relaxed);
         let item = self.items[fetched as usize % SIZE].load(Ordering::Relaxed);
-        // The producer reuses the place only after the item was read.
+        // Release: the producer reuses the place only after the item was read.
         self.fetched
             .store(fetched.wrapping_add(1), Ordering::Release);
         Some(item)
     }
 
-    /// Items in the ring, 0 to `SIZE`.
+    /// Returns the number of items in the ring, 0 to `SIZE`.
     pub fn len(&self) -> usize {
         let fetched = self.fetched.load(Ordering::Acquire);
         self.stored.load(Ordering::Acquire).wrapping_sub(fetched) as usize
     }
 
-    /// Whether the ring has no items.
+    /// Returns whether the ring has no items.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Whether the ring has no room.
+    /// Returns whether the ring has no room.
     pub fn is_full(&self) -> bool {
         self.len() == SIZE
     }

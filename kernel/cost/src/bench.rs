@@ -1,4 +1,4 @@
-//! The bench: a card, a scene, pages in RAM, and the work that is measured on them.
+//! The bench: a card, a scene and pages in RAM, and the measured work on them.
 
 use core::fmt;
 use core::hint::black_box;
@@ -12,35 +12,35 @@ use crate::line::{Ask, Figure};
 use crate::screen::{self, Screen};
 use crate::work::{Place, Work};
 
-/// The ball's frame that is measured.
+/// The measured frame of the scene `ball`.
 pub const FRAME: u32 = 480;
-/// Lengths of runs that are measured by themselves. None is longer than a column.
+/// Lengths of spans that are measured separately. The longest is a column.
 pub const LENGTHS: [u16; 16] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 240];
 
-/// Jobs of the screen's face: a run for each line, and room for mappers that cut theirs, into pieces
-/// of ten pixels and more.
+/// Jobs of the face that fills the screen: a span for each line, and space for mappers that cut spans into
+/// pieces of ten or more pixels.
 const MAX_JOBS: usize = 8192;
-/// What the bare loops store.
+/// The value that the bare loops store.
 const BARE: u8 = 0x55;
-/// Instructions that the clock is compared with.
+/// Instructions that the clock is calibrated with.
 const KNOWN: u32 = 4_000_000;
 
-/// Where an answer's lines go, each without its checksum.
+/// A sink for an answer's lines, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
-/// What tells how long work takes.
+/// The clock that measures how long work takes, and what is known of the CPU.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
-    /// The time, in ticks. No memory access may be moved across it.
+    /// Returns the time in ticks. The compiler must move no memory access across a call.
     pub now: fn() -> u64,
-    /// Carries out as many instructions.
+    /// Carries out the given number of instructions.
     pub instructions: fn(u32),
     /// Whether the CPU has the bit-extract instruction (BMI2).
     pub bmi2: bool,
 }
 
-/// The fixed memory of the bench, zeros at first. About 2.5 MiB: meant for a static, which then takes
-/// no room in an image.
+/// The fixed memory of the bench, about 2.5 MiB. It is zero at first and meant for a static, which then
+/// occupies no space in an image.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
     ball: [u8; scene::TEXELS],
@@ -52,7 +52,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Empty.
+    /// Returns empty memory.
     pub const fn new() -> Self {
         Self {
             ball: [0; scene::TEXELS],
@@ -71,14 +71,14 @@ impl Default for Memory {
     }
 }
 
-/// Everything that work needs, prepared.
+/// Everything that the work needs, prepared.
 #[derive(Debug)]
 pub struct Bench<'a, B> {
     card: ModeX<B>,
     stage: Stage<'a>,
     pose: Pose,
-    /// The ball's texture in full light: of a texture job making reads the sides, and those are the
-    /// same in every light.
+    /// The ball's texture in full light. Making jobs reads only a texture's sides, which are the same in
+    /// every light.
     ball: Texture<'a>,
     screen: Screen,
     square: [Texture<'a>; 1],
@@ -111,19 +111,19 @@ impl<'a, B: Bus> Bench<'a, B> {
         })
     }
 
-    /// The card's bus.
+    /// Returns the card's bus.
     pub fn bus(&mut self) -> &mut B {
         self.card.bus()
     }
 
-    /// Says that bytes of the serial line may be missing before the next one, or that the next one
-    /// is damaged: its line is refused ([`Lines::damage`]).
+    /// Marks the serial line as damaged: bytes before the next byte may be missing, or the next byte arrived
+    /// damaged. The line of the next byte is refused ([`Lines::damage`]).
     pub fn damage(&mut self) {
         self.lines.damage();
     }
 
-    /// Takes a byte of the serial line; with the one that ends a line, answers it. True when it
-    /// asked to leave.
+    /// Handles a byte from the serial line. If the byte ends a line, answers the line. Returns true if the
+    /// line was `leave`.
     pub fn receive(&mut self, byte: u8, clock: &Clock, out: &mut Out<'_>) -> bool {
         let ask = match self.lines.push(byte) {
             None => return false,
@@ -145,12 +145,12 @@ impl<'a, B: Bus> Bench<'a, B> {
         }
     }
 
-    /// Measures what is asked for, and then tells it.
+    /// Carries a request out, and then writes its answer.
     pub fn answer(&mut self, ask: Ask, clock: &Clock, out: &mut Out<'_>) {
         match ask {
             Ask::Calibrate => {
                 let took = |count| ticks(clock.now, &mut || (clock.instructions)(count));
-                // A warm-up, and the call itself taken off.
+                // Runs once to warm up. The difference of two counts cancels the cost of the call.
                 took(KNOWN);
                 let [more, less] = [2 * KNOWN, KNOWN].map(took);
                 out(format_args!(
@@ -190,18 +190,18 @@ impl<'a, B: Bus> Bench<'a, B> {
         out(format_args!("{OK} {ask}"));
     }
 
-    /// Has the next work done by a mapper in an order.
+    /// Sets the mapper and the order of the work that follows.
     pub fn set(&mut self, mapper: Mapper, order: Order) {
         self.stage.set_mapper(mapper);
         self.stage.set_order(order);
     }
 
-    /// What is done once before a work: afterwards it takes the same each time.
+    /// Prepares a piece of work, so that each repetition is the same.
     pub fn prepare(&mut self, work: Work) {
         match work {
             Work::ScreenRam | Work::ScreenCard => self.make_screen_jobs(),
-            // Before it the card's pages may hold anything. With the ball on each of them every
-            // picture erases and presents what the one before left.
+            // The card's pages may hold anything at first. With the ball on every page, each frame erases and
+            // presents what the frame before it left.
             Work::Present => {
                 let background = self.stage.background();
                 for _ in 0..modex::PAGES {
@@ -215,7 +215,7 @@ impl<'a, B: Bus> Bench<'a, B> {
         }
     }
 
-    /// Does a work, and returns the ticks that it took.
+    /// Does a piece of work, and returns the ticks that it needed.
     ///
     /// # Panics
     /// If the mapper drops a face.
@@ -299,8 +299,8 @@ impl<'a, B: Bus> Bench<'a, B> {
         ticks
     }
 
-    /// Each work in rounds, the works of a round one after the other: what drifts on the host does
-    /// so for all of them. A first round is not told.
+    /// Measures every piece of work once in each round, one after the other, so that a drift of the host
+    /// affects all of them alike. The first round is a warm-up and is not counted.
     fn measure(&mut self, rounds: usize, now: fn() -> u64) -> [Figure; Work::ALL.len()] {
         let ball = self.pixels_of_the_ball();
         let mut figures = Work::ALL.map(|(_, work)| {
@@ -324,7 +324,7 @@ impl<'a, B: Bus> Bench<'a, B> {
         figures
     }
 
-    /// Making the jobs of a face whose runs are all `length` pixels long, and drawing them in RAM.
+    /// Measures a face whose spans are all `length` pixels long: making its jobs, and drawing them in RAM.
     fn runs(&mut self, length: u16, rounds: usize, now: fn() -> u64) -> [Figure; 2] {
         let (mapper, order) = (self.stage.mapper(), self.stage.order());
         let Self {
@@ -368,7 +368,7 @@ impl<'a, B: Bus> Bench<'a, B> {
         self.stage.draw(&self.pose, self.offscreen).pixels as usize
     }
 
-    /// The CRC-32 of the picture at a place, pixel by pixel from the top left.
+    /// Returns the CRC-32 of the frame at a place, pixel by pixel from the top left.
     fn checksum(&mut self, place: Place) -> Option<u32> {
         let mut sum = Checksum::new();
         for y in 0..HEIGHT {
@@ -390,7 +390,7 @@ impl<'a, B: Bus> Bench<'a, B> {
     }
 }
 
-/// Reads of the clock, in pairs, that a work's ticks have in them.
+/// Returns how many pairs of clock reads the ticks of a piece of work include.
 fn pairs(work: Work) -> u64 {
     match work {
         Work::Present => u64::from(work.pictures()),
@@ -398,8 +398,8 @@ fn pairs(work: Work) -> u64 {
     }
 }
 
-/// Ticks from before the work to after it, a pair of reads included. Never inlined, and the work
-/// not known: it is the same two calls around every work.
+/// Returns the ticks from before the work to after it, including a pair of clock reads. It is never inlined
+/// and the compiler does not know the work, so the same two calls surround every piece of work.
 #[inline(never)]
 fn ticks(now: fn() -> u64, work: &mut dyn FnMut()) -> u64 {
     let work = black_box(work);

@@ -1,22 +1,22 @@
-//! What drawing costs: pieces of work that can be repeated, and the protocol that asks for them.
+//! The bench: repeatable pieces of drawing work that are measured, and the protocol that requests them.
 //!
-//! The measuring kernel gives a [`Bench`] the bare machine's card and its time stamp counter, and
-//! the host asks for one mapper and order after the other. Nothing is counted while time is taken:
-//! port writes and stores are counted by the same bench on the emulated card behind a
-//! [`modex::Counted`], and `check` tells the pictures' checksums of both.
+//! The bench kernel gives a [`Bench`] the bare machine's card and its time stamp counter. The host requests
+//! one mapper and order after the other. Nothing is counted during a measurement of time: port writes and
+//! stores are counted by the same bench on the emulated VGA behind a [`modex::Counted`]. `check` prints
+//! checksums of the frames, so that both can be compared.
 //!
 //! # The protocol
 //!
-//! As in [`link`]: lines with checksums, an answer closes with `ok` and what was asked, or `error`.
-//! Nothing is said while something is measured.
+//! As in [`link`]: lines have checksums, and the last line of an answer is `ok` with the request, or `error`.
+//! The kernel sends nothing during a measurement.
 //!
 //! | line | answer, before `ok` |
 //! | --- | --- |
 //! | `calibrate` | `instructions 4000000 ticks 4000000`, and whether the CPU has BMI2: `bmi2 no` |
 //! | `measure affine planes 5` | for each [`Work`] its pixels and the ticks of each round: `screen-ram pixels 76800 ticks 5 5 5 5 5` |
 //! | `runs affine planes 5` | for each of [`LENGTHS`] the same of `run-8-jobs` and `run-8-draw` |
-//! | `check affine planes` | for each work that draws the CRC-32 of its picture: `screen-ram crc 5d41402a` |
-//! | `leave` | after the `ok` QEMU ends |
+//! | `check affine planes` | for each work that draws the CRC-32 of its frame: `screen-ram crc 5d41402a` |
+//! | `leave` | no lines; QEMU ends after the `ok` |
 #![no_std]
 #![forbid(unsafe_code)]
 

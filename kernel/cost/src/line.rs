@@ -1,4 +1,4 @@
-//! What is asked, and how figures are written.
+//! Requests, and the text of measured figures.
 
 use core::fmt;
 
@@ -8,27 +8,28 @@ use texmap::{Mapper, Order};
 /// Most rounds of one measurement.
 pub const MAX_ROUNDS: usize = 15;
 
-/// Something to measure, as it stands on a line.
+/// A request, as a line contains it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ask {
-    /// `calibrate`: the clock against a known number of instructions.
+    /// `calibrate`: measure the clock with a known number of instructions.
     Calibrate,
-    /// `measure MAPPER ORDER ROUNDS`: each [`crate::Work`], in rounds, after one that is not told.
+    /// `measure MAPPER ORDER ROUNDS`: measure each [`crate::Work`] in this many rounds, after a warm-up
+    /// round.
     Measure(Mapper, Order, usize),
-    /// `runs MAPPER ORDER ROUNDS`: faces whose runs are all of one length, in RAM.
+    /// `runs MAPPER ORDER ROUNDS`: measure faces whose spans all have one length, in RAM.
     Runs(Mapper, Order, usize),
-    /// `check MAPPER ORDER`: what each work draws.
+    /// `check MAPPER ORDER`: print the checksum of what each work draws.
     Check(Mapper, Order),
     /// `leave`: end QEMU with the code for success.
     Leave,
 }
 
-/// Why a line asks for nothing.
+/// Why a line is not a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AskError {
-    /// It is none of the five.
+    /// The line is not one of the five requests.
     Unknown,
-    /// It has a checksum, and it is wrong.
+    /// The line has a checksum, which is wrong.
     Checksum(FrameError),
 }
 
@@ -46,10 +47,10 @@ impl fmt::Display for AskError {
 }
 
 impl Ask {
-    /// Reads a line, its checksum checked if it has one.
+    /// Parses a line, and checks its checksum if it has one.
     ///
     /// # Errors
-    /// A line that asks for nothing.
+    /// The line is not a request.
     pub fn parse(line: &str) -> Result<Self, AskError> {
         let text = match unframe(line) {
             Ok(text) => text,
@@ -92,7 +93,7 @@ impl fmt::Display for Ask {
     }
 }
 
-/// What a piece of work took, round by round.
+/// The measured ticks of a piece of work, one value a round.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Figure {
     pixels: u64,
@@ -101,7 +102,7 @@ pub struct Figure {
 }
 
 impl Figure {
-    /// Of work that draws `pixels` pixels a round.
+    /// Returns a figure without rounds, for work that draws `pixels` pixels a round.
     pub fn new(pixels: u64) -> Self {
         Self {
             pixels,
@@ -112,23 +113,23 @@ impl Figure {
     /// Adds a round.
     ///
     /// # Panics
-    /// If there are [`MAX_ROUNDS`] already.
+    /// If the figure already has [`MAX_ROUNDS`] rounds.
     pub fn add(&mut self, ticks: u64) {
         self.ticks[self.rounds] = ticks;
         self.rounds += 1;
     }
 
-    /// Pixels of a round.
+    /// Returns the pixels that a round draws.
     pub fn pixels(&self) -> u64 {
         self.pixels
     }
 
-    /// The clock's ticks of each round.
+    /// Returns the clock's ticks of each round.
     pub fn ticks(&self) -> &[u64] {
         &self.ticks[..self.rounds]
     }
 
-    /// Reads `pixels P ticks T ...`, as [`fmt::Display`] writes it.
+    /// Parses `pixels P ticks T ...`, as [`fmt::Display`] writes it.
     pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
         let number = |word: &str| -> Option<u64> {
             let digits = word.bytes().all(|b| b.is_ascii_digit());

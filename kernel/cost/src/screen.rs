@@ -1,29 +1,29 @@
-//! One face that fills the screen, at an angle: work for the loops and little else.
+//! A slanted face that fills the screen, so that nearly all work is in the inner loops.
 
 use modex::{HEIGHT, WIDTH};
 use texmap::coverage::Axis;
 use texmap::plane::{Anchor, Plane, Walk, coordinate};
 use texmap::{Face, SUBPIXELS, Texture, Vertex};
 
-/// Side of the texture.
+/// Width and height of the texture.
 const SIDE: u16 = Texture::MAX_SIDE;
-/// Texels in it.
+/// Texels in the texture.
 pub const TEXELS: usize = SIDE as usize * SIDE as usize;
 
-/// In 1/64 unit: the texture's middle is 4 units before the eye, its axes are turned by 30 degrees
-/// about the line of sight, and both lead away from the viewer. About half a texel a pixel; depths
-/// on the screen are within a ratio of 1.3, and its corners inside the texture.
+/// The texture's middle, in 1/64 unit: 4 units in front of the eye. The texture's axes are turned by 30
+/// degrees about the line of sight, and both lead away from the viewer. A pixel is about half a texel wide,
+/// depths on the screen are within a ratio of 1.3, and the screen's corners are inside the texture.
 const MIDDLE: [i32; 3] = [0, 0, 256];
-/// From the left border of the texture to the right one.
+/// The vector from the left border of the texture to the right.
 const ACROSS: [i32; 3] = [440, 254, 77];
-/// From its top to its bottom.
+/// The vector from the top of the texture to the bottom.
 const DOWN: [i32; 3] = [-254, 440, 38];
-/// 16.16 of 1/64.
+/// 1/64 unit, 16.16.
 const UNIT: i32 = 1 << 10;
 
 const FOCAL_LENGTH: i32 = scene::FOCAL_LENGTH;
 
-/// The face, and the pattern of its texture.
+/// The screen's polygon, and the plane of its texture.
 #[derive(Clone, Copy, Debug)]
 pub struct Screen {
     polygon: [Vertex; 4],
@@ -31,8 +31,8 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// With its corners where the texture's plane has them: affine mappers and those in perspective
-    /// walk the same part of the texture.
+    /// Returns the face that fills the screen. Its corners have the coordinates that the texture's plane has
+    /// there, so affine mappers and perspective mappers traverse the same part of the texture.
     pub fn new() -> Self {
         let anchors = [(0, 0), (SIDE, 0), (0, SIDE)].map(|(u, v)| {
             let part = |k: usize, side: u16, axis: [i32; 3]| match side {
@@ -50,7 +50,7 @@ impl Screen {
         let (right, bottom) = (WIDTH as u16, HEIGHT as u16);
         let corners = [(0, 0), (right, 0), (right, bottom), (0, bottom)];
         let polygon = corners.map(|(x, y)| {
-            // At the centre of the corner's pixel: half a pixel inwards.
+            // Use the centre of the corner's pixel, half a pixel inwards.
             let pixel = (x.min(right - 1), y.min(bottom - 1));
             let [a, b, c] = Walk::new(&plane, Axis::Down, pixel.0, pixel.1).at;
             Vertex {
@@ -63,7 +63,7 @@ impl Screen {
         Self { polygon, anchors }
     }
 
-    /// The face, with texture 0.
+    /// Returns the face, with texture 0.
     pub fn face(&self) -> Face<'_> {
         Face {
             polygon: &self.polygon,
@@ -73,8 +73,8 @@ impl Screen {
         }
     }
 
-    /// Its part that is `width` x `height` pixels at the top left, for runs of such lengths. The
-    /// texture is squeezed with it: what a run costs does not depend on that.
+    /// Returns the face reduced to the `width` x `height` pixels at the top left, for spans of these lengths.
+    /// For affine mappers this squeezes the texture, which does not change what a span costs.
     pub fn part(&self, width: u16, height: u16) -> Self {
         let mut part = *self;
         for vertex in &mut part.polygon {
@@ -85,7 +85,7 @@ impl Screen {
     }
 }
 
-/// Paints the texture: no two neighbours are alike.
+/// Paints the texture, in which no two neighbours are equal.
 pub fn paint(texels: &mut [u8; TEXELS]) -> Texture<'_> {
     for (j, row) in (0..=u8::MAX).zip(texels.chunks_exact_mut(SIDE.into())) {
         for (i, texel) in (0..=u8::MAX).zip(row) {

@@ -2,52 +2,53 @@
 
 use core::fmt;
 
-/// A piece of work. Each can be done again and again, and then takes the same instructions.
+/// A piece of work. It can be repeated, and each repetition carries out the same instructions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Work {
-    /// A constant stored in every pixel of the screen, column by column, in RAM.
+    /// Store a constant in every pixel of the screen in RAM, column by column.
     BareRam,
-    /// The same on the card: Map Mask once a column. What byte stores alone cost.
+    /// The same on the card, with a write to Map Mask for each column: the cost of byte stores alone.
     BareCard,
-    /// Jobs made of the one face that fills the screen.
+    /// Make the jobs of the one face that fills the screen.
     ScreenJobs,
-    /// Those jobs drawn in RAM.
+    /// Draw these jobs in RAM.
     ScreenRam,
-    /// Those jobs drawn on the card.
+    /// Draw these jobs on the card.
     ScreenCard,
-    /// The ball's picture presented from RAM, where it was drawn before: eight bytes a store, plane
-    /// by plane, nothing else.
+    /// Present the ball's frame from RAM, where it was drawn before: eight bytes a store, plane by plane,
+    /// nothing else.
     Present,
-    /// The ball straight to the card: erased, drawn, flipped.
+    /// Erase, draw the ball on the card, and flip.
     FrameCard,
-    /// Of the same what comes before the mapper: turning, clipping, light.
+    /// The part of drawing the ball that comes before the mapper: turning, clipping, light.
     FrameFaces,
-    /// That, and jobs made of the faces.
+    /// The same, and make the jobs of the faces.
     FrameJobs,
-    /// That, and the jobs drawn on the card: all but erasing and flipping.
+    /// The same, and draw the jobs on the card: everything except erasing and flipping.
     FrameDrawCard,
     /// The same in RAM.
     FrameDrawRam,
-    /// The ball by way of RAM: erased and drawn there, presented, flipped.
+    /// Erase and draw the ball in RAM, present the frame, and flip.
     FramePresented,
 }
 
-/// Where a piece of work leaves its picture.
+/// The place where a piece of work leaves its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// Nowhere.
+    /// No place: the work draws no pixels.
     Nowhere,
-    /// The page in RAM for the screen's face.
+    /// The page in RAM for the face that fills the screen.
     Page,
     /// The page in RAM that is presented.
     Offscreen,
-    /// The page on the screen.
+    /// The displayed page.
     Card,
 }
 
 impl Work {
-    /// Every work with its name, in the order of a round: whatever draws on the card without
-    /// erasing comes before [`Work::Present`], the first of the ball's.
+    /// All pieces of work with their names, in the order of a round. Work that fills the whole screen of the
+    /// card comes before [`Work::Present`], whose preparation puts the ball on every page. So the work on the
+    /// ball that follows erases only the ball.
     pub const ALL: [(&'static str, Self); 12] = [
         ("bare-ram", Self::BareRam),
         ("bare-card", Self::BareCard),
@@ -63,16 +64,17 @@ impl Work {
         ("frame-presented", Self::FramePresented),
     ];
 
-    /// The work of a name.
+    /// Returns the piece of work with a name.
     pub fn parse(name: &str) -> Option<Self> {
         let named = Self::ALL.iter().find(|(known, _)| *known == name);
         named.map(|&(_, work)| work)
     }
 
-    /// Pictures that are drawn, each of the same pixels.
+    /// Returns the number of frames that the work draws, each with the same pixels.
     ///
-    /// Where the work flips there are two: three pages in rotation make every second picture wait
-    /// for a retrace, so that two together always take the same.
+    /// [`Work::Present`], [`Work::FrameCard`] and [`Work::FramePresented`] draw two frames and flip after
+    /// each: with three pages in rotation, every second frame waits for a retrace, so two frames together
+    /// always need the same time.
     pub fn pictures(self) -> u32 {
         match self {
             Self::Present | Self::FrameCard | Self::FramePresented => 2,
@@ -80,12 +82,12 @@ impl Work {
         }
     }
 
-    /// Whether the picture is the ball's.
+    /// Returns whether the work draws the ball.
     pub fn is_of_the_ball(self) -> bool {
         self >= Self::Present
     }
 
-    /// Where the picture is then.
+    /// Returns the place where the work leaves its frame.
     pub fn place(self) -> Place {
         match self {
             Self::ScreenJobs | Self::FrameFaces | Self::FrameJobs => Place::Nowhere,

@@ -1,34 +1,34 @@
-//! What a running show can be told to do: by a key, or by `steer` on the line.
+//! Actions that steer a running demo, by a key or by `steer`.
 
 use core::fmt;
 
 use crate::{Setting, Word};
 
-/// One thing to do, as one key does it.
+/// An action. Each key that does something has one action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Action {
-    /// `yaw-left`: turn about the solid's own axis, what looks at the viewer to the left.
+    /// `yaw-left`: turn about the solid's own axis; the side towards the viewer moves to the left.
     YawLeft,
     /// `yaw-right`
     YawRight,
-    /// `pitch-up`: turn about the screen's horizontal, what looks at the viewer up.
+    /// `pitch-up`: turn about the screen's horizontal axis; the side towards the viewer moves up.
     PitchUp,
     /// `pitch-down`
     PitchDown,
-    /// `roll-left`: turn about the line of sight, the top to the left.
+    /// `roll-left`: turn about the line of sight; the top moves to the left.
     RollLeft,
     /// `roll-right`
     RollRight,
-    /// `faster`: everything that moves; what stands still begins to, as the scene has it.
+    /// `faster`: speed up all motion; if nothing moves, start the scene's own motion.
     Faster,
-    /// `slower`
+    /// `slower`: slow down all motion.
     Slower,
     /// `stop`: nothing moves.
     Stop,
-    /// `pause`: nothing moves until it is said again.
+    /// `pause`: stop all motion, or continue it.
     Pause,
-    /// `step`: pause, and then a tick each time.
+    /// `step`: pause; if paused already, advance by one tick.
     Step,
     /// `nearer`
     Nearer,
@@ -38,30 +38,30 @@ pub enum Action {
     NextScene,
     /// `next-mapper`
     NextMapper,
-    /// `last-mapper`: the one before.
+    /// `last-mapper`: the mapper before this one in the list.
     LastMapper,
-    /// `finer`: half the error of `within-T`.
+    /// `finer`: halve the error bound of `within-T`.
     Finer,
-    /// `coarser`: twice the error.
+    /// `coarser`: double the error bound of `within-T`.
     Coarser,
     /// `next-order`
     NextOrder,
-    /// `quality`: lower while it moves, where motion hides it, or no more.
+    /// `quality`: switch reduced quality on or off, for faces whose motion hides it.
     Quality,
-    /// `help`: the keys, written over the picture, or no more.
+    /// `help`: switch the list of keys over the frame on or off.
     Help,
-    /// `info`: figures of the pictures, written over them, or no more.
+    /// `info`: switch the figures over the frames on or off.
     Info,
-    /// `split`: the picture three times, as it is, exact, and its error, or no more.
+    /// `split`: switch the split view on or off: the frame as it is, the exact frame, and the error.
     Split,
-    /// `hint`: for five seconds, which key is help.
+    /// `hint`: for five seconds, show which key is help.
     Hint,
-    /// `reset`: move as the scene does, with the default settings. The scene stays.
+    /// `reset`: the scene's own motion and the default settings. The scene stays.
     Reset,
 }
 
 impl Action {
-    /// Every action with its name on the line.
+    /// All actions, with their names in the protocol.
     pub const ALL: [(&'static str, Self); 25] = [
         ("yaw-left", Self::YawLeft),
         ("yaw-right", Self::YawRight),
@@ -90,13 +90,13 @@ impl Action {
         ("reset", Self::Reset),
     ];
 
-    /// Whether it changes nothing but how a running show is looked at. A log has none of these, and
-    /// a held show no use for them.
+    /// Returns whether an action changes only the overlay of a running demo. A log contains no such action,
+    /// and a held demo refuses it.
     pub const fn is_overlay(self) -> bool {
         matches!(self, Self::Help | Self::Info | Self::Split | Self::Hint)
     }
 
-    /// The action of a name.
+    /// Returns the action with a name.
     pub fn parse(name: &str) -> Option<Self> {
         let named = Self::ALL.iter().find(|(known, _)| *known == name);
         named.map(|&(_, action)| action)
@@ -110,10 +110,10 @@ impl fmt::Display for Action {
     }
 }
 
-/// What changes a running show's pictures from a tick on.
+/// A change to a running demo's frames, from a tick on.
 ///
-/// The tag stands apart, and [`Action::YawLeft`] is all zeros: a log that is empty then takes no room
-/// in the kernel's image.
+/// `repr(u8)` keeps the tag in a byte before the payload, so a change to [`Action::YawLeft`] is all zeros. An
+/// empty log then occupies no space in the kernel's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Change {
@@ -124,7 +124,7 @@ pub enum Change {
 }
 
 impl Change {
-    /// Reads a change, as [`fmt::Display`] writes it.
+    /// Parses a change, as [`fmt::Display`] writes it.
     pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
         let first = words.next()?;
         let change = match Setting::parse(first) {

@@ -1,76 +1,75 @@
-//! What the host can ask.
+//! Commands: what the host can request.
 
 use core::fmt;
 
 use crate::{Change, FrameError, unframe};
 
-/// A command, as it stands on a line.
+/// A command, as a line contains it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
-    /// `hold`: stop the show, clear the pages, take every setting back, and draw only what is asked
-    /// for. From here on the picture memory depends on the commands alone.
+    /// `hold`: stop the demo, clear the pages, reset every setting, and draw only on command. From here on
+    /// video memory depends on the commands alone.
     Hold,
-    /// `run`: let the show run. One that was held has the settings that are set, and moves as its scene
-    /// does.
+    /// `run`: let the demo run. A demo that was held keeps its settings, and moves as its scene does.
     Run,
-    /// `show PICTURE`: draw it on the next page, flip, and answer when the flip holds. A show
-    /// that runs is stopped first, its settings as they are.
+    /// `show PICTURE`: draw a frame on the next page, flip, and answer when the flip takes effect. A running
+    /// demo is stopped first and keeps its settings.
     Show(Picture),
-    /// `show PICTURE motion MOTION`: the same in reduced quality, as a solid that moves by so much a
-    /// tick is drawn.
+    /// `show PICTURE motion MOTION`: the same in reduced quality, as for a solid with this motion per tick.
     ShowMoving(Picture, Motion),
-    /// `show at TICK`: the same with the picture that the show has, or had, at a tick: that of its
-    /// log. Scene, mapper and order are then those of that tick.
+    /// `show at TICK`: the same with the frame that the demo's log gives for a tick. Scene, mapper and order
+    /// are then those of that tick.
     ShowAt(u32),
-    /// `scene NAME`, `mapper NAME`, `order NAME`: from the next picture on. Without a name: which there are, and
-    /// which is set.
+    /// `scene NAME`, `mapper NAME`, `order NAME`: change a setting from the next frame on. Without a name:
+    /// list the values, and mark the current value.
     Set(Setting, Option<Word>),
-    /// `steer CHANGE`: of the running show, now. `steer TICK CHANGE`: noted in the log of a held one,
-    /// for `show at`; ticks may not go back.
+    /// `steer CHANGE`: change the running demo now. `steer TICK CHANGE`: add a change to the log of a held
+    /// demo, for `show at`; ticks may not decrease.
     Steer(Option<u32>, Change),
-    /// `log`: what was steered, as commands that a held show takes.
+    /// `log`: print the changes so far, as commands that a held demo accepts.
     Log,
-    /// `keys`: which key does what.
+    /// `keys`: list the keys and their actions.
     Keys,
-    /// `dump` or `dump all`: what the card holds, read back from it, as [`crate::dump`] writes it.
+    /// `dump` or `dump all`: print the card's content, read back from the card, in the format of
+    /// [`crate::dump`].
     Dump(Content),
-    /// `checksums` or `checksums all`: the CRC-32 of the same, and no byte of it.
+    /// `checksums` or `checksums all`: print the CRC-32 of the same content instead of its bytes.
     Checksums(Content),
-    /// `registers`: every register of the mode, read back.
+    /// `registers`: print every register of the mode, read back from the card.
     Registers,
-    /// `counts`: what the last picture took, and how the show keeps its pace.
+    /// `counts`: print the counts of the last frame, and how the demo keeps up with the ticks.
     Counts,
-    /// `state`: running or held, and what is on the screen.
+    /// `state`: print whether the demo runs or is held, and what is on the screen.
     State,
-    /// `version`: of the program, the protocol and the dumps.
+    /// `version`: print the versions of the program, the protocol and the dumps.
     Version,
-    /// `fail KIND`: break in the way that is named, to prove that the host notices.
+    /// `fail KIND`: fail in the named way, to prove that the host notices.
     Fail(Fault),
     /// `leave`: end QEMU with the code for success.
     Leave,
 }
 
-/// A picture by its name.
+/// The name of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Picture {
     /// `N`: the scene's default pose at tick N.
     Frame(u32),
-    /// `pose YAW PITCH ROLL DISTANCE`, each in up to eight hex digits: the angles as 32-bit
-    /// fractions of a turn, the distance in 16.16.
+    /// `pose YAW PITCH ROLL DISTANCE`, each in up to eight hex digits: the angles as 32-bit fractions of a
+    /// turn, the distance in 16.16.
     Pose {
-        /// About the solid's own axis.
+        /// Turn about the solid's own axis.
         yaw: u32,
-        /// About the screen's horizontal.
+        /// Turn about the screen's horizontal axis.
         pitch: u32,
-        /// About the line of sight.
+        /// Turn about the line of sight.
         roll: u32,
-        /// From the eye to the solid's centre.
+        /// Distance from the eye to the solid's centre.
         distance: u32,
     },
 }
 
 impl Picture {
-    /// Reads a name, as [`fmt::Display`] writes it.
+    /// Parses a name, as [`fmt::Display`] writes it.
     pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
         let picture = match words.next()? {
             "pose" => Self::Pose {
@@ -85,8 +84,8 @@ impl Picture {
     }
 }
 
-/// How much a pose changes in a tick. Each part is added to the pose's part modulo 2^32, so that a
-/// part that falls is a two's complement.
+/// The change of a pose in a tick. Each part is added to the pose's part modulo 2^32, so a negative change is
+/// a two's complement.
 ///
 /// In reduced quality the motion decides which faces are drawn by a faster mapper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,7 +101,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Reads a motion, as [`fmt::Display`] writes it: four words of up to eight hex digits.
+    /// Parses a motion, as [`fmt::Display`] writes it: four words of up to eight hex digits.
     pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
         let motion = Self {
             yaw: hex(words.next()?)?,
@@ -126,13 +125,14 @@ impl fmt::Display for Motion {
     }
 }
 
-/// A number of one to eight hex digits: `from_str_radix` would accept a sign and leading zeros.
+/// Parses one to eight hex digits. `from_str_radix` would also accept a sign, and more digits after leading
+/// zeros.
 fn hex(word: &str) -> Option<u32> {
     let digits = word.len() <= 8 && word.bytes().all(|b| b.is_ascii_hexdigit());
     u32::from_str_radix(word, 16).ok().filter(|_| digits)
 }
 
-/// A number of digits alone: `parse` would take a sign.
+/// Parses decimal digits. `parse` would also accept a sign.
 fn decimal(word: &str) -> Option<u32> {
     let digits = word.bytes().all(|b| b.is_ascii_digit());
     word.parse().ok().filter(|_| digits)
@@ -152,26 +152,27 @@ impl fmt::Display for Picture {
     }
 }
 
-/// What can be set by name.
+/// A setting that commands change by name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Setting {
-    /// `scene`: what is shown. The card is set anew.
+    /// `scene`: the scene to draw. The card's mode is set again; in a running demo, only if the scene
+    /// changes.
     Scene,
-    /// `mapper`: how textures are mapped.
+    /// `mapper`: the mapper of textures.
     Mapper,
-    /// `order`: in which order and where to the runs of a picture are drawn.
+    /// `order`: the order in which a frame's spans are drawn, and the memory that they are drawn in.
     Order,
 }
 
 impl Setting {
-    /// Every setting with its word.
+    /// All settings, with their words.
     pub const ALL: [(&'static str, Self); 3] = [
         ("scene", Self::Scene),
         ("mapper", Self::Mapper),
         ("order", Self::Order),
     ];
 
-    /// The setting of a word.
+    /// Returns the setting with a word.
     pub fn parse(word: &str) -> Option<Self> {
         let known = Self::ALL.iter().find(|(known, _)| *known == word);
         known.map(|&(_, setting)| setting)
@@ -185,7 +186,7 @@ impl fmt::Display for Setting {
     }
 }
 
-/// A name of something, which only the program knows.
+/// A name that only the program can interpret.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Word {
     bytes: [u8; Self::MAX],
@@ -193,10 +194,10 @@ pub struct Word {
 }
 
 impl Word {
-    /// Most characters.
+    /// Most characters in a word.
     pub const MAX: usize = 24;
 
-    /// A word of 1 to [`Word::MAX`] printable ASCII characters, no space among them.
+    /// Returns a word, if `text` is 1 to [`Word::MAX`] printable ASCII characters without a space.
     pub fn new(text: &str) -> Option<Self> {
         let legal = !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_graphic());
         let mut bytes = [0; Self::MAX];
@@ -208,7 +209,7 @@ impl Word {
         Some(Self { bytes, len })
     }
 
-    /// The word that something is displayed as, if it is one.
+    /// Returns the word that `named` displays as, if that is a legal word.
     pub fn of(named: impl fmt::Display) -> Option<Self> {
         struct Text([u8; Word::MAX], usize);
         impl fmt::Write for Text {
@@ -225,9 +226,9 @@ impl Word {
         Self::new(core::str::from_utf8(&text.0[..text.1]).ok()?)
     }
 
-    /// Its text.
+    /// Returns the word's text.
     pub fn as_str(&self) -> &str {
-        // ASCII, as `new` has seen.
+        // `new` has checked that the bytes are ASCII.
         core::str::from_utf8(&self.bytes[..self.len.into()]).unwrap_or_default()
     }
 }
@@ -238,7 +239,7 @@ impl fmt::Display for Word {
     }
 }
 
-/// How much of video memory.
+/// How much of video memory a dump contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
     /// The page on the screen.
@@ -247,12 +248,12 @@ pub enum Content {
     Memory,
 }
 
-/// A way to break.
+/// A way to fail on purpose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
     /// `panic`
     Panic,
-    /// `panic-in-line`: in the middle of a line of an answer, with the serial line locked.
+    /// `panic-in-line`: panic in the middle of a line of an answer, with the serial line locked.
     PanicInLine,
     /// `page-fault`
     PageFault,
@@ -260,14 +261,14 @@ pub enum Fault {
     StackOverflow,
     /// `triple-fault`
     TripleFault,
-    /// `adapter`: as if the display adapter did not take Mode X.
+    /// `adapter`: fail as if the display adapter did not support Mode X.
     Adapter,
     /// `hang`
     Hang,
 }
 
 impl Fault {
-    /// Every fault with its name on the line.
+    /// All faults, with their names in the protocol.
     pub const ALL: [(&'static str, Self); 7] = [
         ("panic", Self::Panic),
         ("panic-in-line", Self::PanicInLine),
@@ -282,16 +283,16 @@ impl Fault {
 /// Why a line is not a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandError<'a> {
-    /// The first word is none of the commands.
+    /// The first word is not a command.
     Unknown(&'a str),
-    /// The words after the command are not what it takes.
+    /// The words after the command are not legal for it.
     Arguments {
         /// The command.
         command: &'a str,
-        /// What it takes.
+        /// The arguments that the command accepts.
         takes: &'static str,
     },
-    /// The line has a checksum, and it is wrong.
+    /// The line has a checksum, which is wrong.
     Checksum(FrameError),
 }
 
@@ -311,10 +312,10 @@ impl fmt::Display for CommandError<'_> {
 }
 
 impl Command {
-    /// Reads a command, its checksum checked if it has one.
+    /// Parses a command, and checks its checksum if it has one.
     ///
     /// # Errors
-    /// A line that is none.
+    /// The line is not a command.
     pub fn parse(line: &str) -> Result<Self, CommandError<'_>> {
         let text = match unframe(line) {
             Ok(text) => text,

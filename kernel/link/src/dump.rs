@@ -1,4 +1,4 @@
-//! Dumps: what a card holds, as text that `diff` can compare.
+//! Dumps: the content of a card as text that `diff` can compare.
 //!
 //! ```text
 //! crystal-ball dump 4
@@ -15,24 +15,24 @@
 //! end 265 lines 038ed8bb
 //! ```
 //!
-//! Each of them is a line of the protocol, so it ends in its own checksum. The last one counts the
-//! lines before it and has the CRC-32 of them all, each taken without its own checksum and with
-//! an LF. What a terminal does to line ends changes none of it.
+//! Each of these lines is a line of the protocol, so it ends in a checksum. The last line contains the number
+//! of lines before it and their CRC-32. Each line enters that CRC-32 without its own checksum and with an LF
+//! at its end, so changes that a terminal makes to line ends do not matter.
 //!
-//! With `content memory` the lines are `memory 4b00 6b6b ...`: all four planes, 80 addresses a
-//! line, so that a line of a page is a line of the dump. Pixel i of a line is in plane i & 3 at
-//! the line's address plus i / 4; the last line holds the sixteen addresses that are left over.
+//! With `content memory` the lines are `memory 4b00 6b6b ...`: all four planes, 80 addresses a line, so that
+//! a line of a page is a line of the dump. Pixel i of a line is in plane i & 3 at the line's address plus i /
+//! 4; the last line has the sixteen addresses that remain.
 //!
-//! The pack is `none` where a built-in scene is shown; otherwise it is the checksum of the pack that
-//! the model came with, eight hex digits. Dumps of different packs are of different models, though
-//! their scenes have one name.
+//! The pack is `none` for a built-in scene. Otherwise it is the checksum, in eight hex digits, of the pack
+//! that contains the model. Dumps with different packs show different models, even though their scenes have
+//! the same name.
 //!
-//! The header names the picture so that `scene`, `mapper` and `show` draw it again. If some of its faces
-//! were drawn in reduced quality, `motion` is the [`Motion`] that decided which; otherwise it is `none`.
-//! Before the first picture `mapper`, `picture` and `motion` are `none`. Version 3 had no line `motion`
-//! and marked reduced quality by a `~` behind the mapper's name.
+//! The header names the frame so that `scene`, `mapper` and `show` draw it again. If some of its faces were
+//! drawn in reduced quality, `motion` is the [`Motion`] that decided which; otherwise it is `none`. Before
+//! the first frame `mapper`, `picture` and `motion` are `none`. Version 3 had no line `motion` and marked
+//! reduced quality by a `~` behind the mapper's name.
 //!
-//! Two dumps of the same picture on different pages differ in their `start` alone.
+//! Two dumps of the same frame on different pages differ only in their `start`.
 
 use core::fmt;
 
@@ -40,49 +40,48 @@ use crate::{Checksum, Content, Motion, Picture, Word};
 
 /// Version of the format, in a dump's first line.
 pub const VERSION: u32 = 4;
-/// How a dump's first line begins; the version follows.
+/// Start of a dump's first line; the version follows.
 pub const MAGIC: &str = "crystal-ball dump";
-/// Addresses of each plane.
+/// Addresses in each plane.
 pub const PLANE_BYTES: usize = 0x1_0000;
-/// Colours on a line of the palette.
+/// Colours in a line of the palette.
 pub const COLOURS_A_LINE: usize = 16;
-/// Widest picture whose lines fit [`crate::MAX_LINE`].
+/// Widest frame whose lines fit [`crate::MAX_LINE`].
 pub const MAX_WIDTH: usize = 320;
 
-/// What the card's bytes are, at the head of a dump.
+/// The head of a dump: what the bytes show, and where they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header<S> {
-    /// How much is in it.
+    /// How much of video memory the dump contains.
     pub content: Content,
     /// The scene's name, a word.
     pub scene: S,
-    /// The checksum of the pack that the scene came with; none for a built-in one.
+    /// The checksum of the pack that contains the scene; `None` for a built-in scene.
     pub pack: Option<u32>,
-    /// The name of the mapper that drew it; nothing before the first picture.
+    /// The name of the mapper that drew the frame; `None` before the first frame.
     pub mapper: Option<Word>,
-    /// What is on the screen; nothing before the first picture.
+    /// The frame on the screen; `None` before the first frame.
     pub picture: Option<Picture>,
-    /// The motion that decided which of its faces are drawn in reduced quality; nothing if all are
-    /// drawn in full quality.
+    /// The motion that decided which faces are drawn in reduced quality; `None` if all have full quality.
     pub motion: Option<Motion>,
-    /// The start address: where the page on the screen begins in each plane.
+    /// The start address: where the displayed page begins in each plane.
     pub start: u16,
     /// Pixels in a line, a multiple of 4, at most [`MAX_WIDTH`].
     pub width: u16,
-    /// Lines of a page.
+    /// Lines in a page.
     pub height: u16,
 }
 
-/// A row of a dump: its label and where its pixels are.
+/// A row of a dump: its label, and where its pixels are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Row {
-    /// What the row is of.
+    /// The content that the row is a part of.
     pub content: Content,
-    /// For a page the number of the scan line, for memory the address.
+    /// The number of the scan line for a page, and the address for memory.
     pub label: usize,
-    /// Address of its first four pixels.
+    /// Address of the row's first four pixels.
     pub at: u16,
-    /// Pixels in it.
+    /// Pixels in the row.
     pub pixels: usize,
 }
 
@@ -96,7 +95,7 @@ impl fmt::Display for Row {
 }
 
 impl<S> Header<S> {
-    /// The rows of the dump, in their order.
+    /// Returns the rows of the dump, in order.
     pub fn rows(&self) -> impl Iterator<Item = Row> + use<S> {
         self.rows_of(self.content)
     }
@@ -114,7 +113,7 @@ impl<S> Header<S> {
                 Content::Page => Row {
                     content,
                     label: row,
-                    // The card's address counter wraps, too.
+                    // The card's address counter wraps too.
                     at: start.wrapping_add(offset as u16),
                     pixels: 4 * stride,
                 },
@@ -129,7 +128,7 @@ impl<S> Header<S> {
     }
 }
 
-/// The CRC-32 over a dump's lines.
+/// The CRC-32 over a dump's lines. It displays as the dump's last line.
 #[derive(Clone, Debug, Default)]
 pub struct Whole {
     checksum: Checksum,
@@ -137,7 +136,7 @@ pub struct Whole {
 }
 
 impl Whole {
-    /// Takes a line's text in.
+    /// Adds a line's text.
     pub fn add(&mut self, line: fmt::Arguments<'_>) {
         struct Into<'a>(&'a mut Checksum);
         impl fmt::Write for Into<'_> {
@@ -146,7 +145,7 @@ impl Whole {
                 Ok(())
             }
         }
-        // Neither the writer nor what is written here fails.
+        // Neither the writer nor the values that are written can fail.
         let _ = fmt::write(&mut Into(&mut self.checksum), line);
         self.checksum.add(b"\n");
         self.lines += 1;
@@ -160,8 +159,8 @@ impl fmt::Display for Whole {
     }
 }
 
-/// Writes a dump, a line at a time. `load` fills a slice with the pixels from an address on:
-/// pixel i is in plane i & 3 at the address plus i / 4.
+/// Writes a dump, a line at a time. `load` fills a slice with the pixels from an address on: pixel i is in
+/// plane i & 3 at the address plus i / 4.
 ///
 /// # Panics
 /// If the header's width is more than [`MAX_WIDTH`].
@@ -212,7 +211,7 @@ pub fn write<S: fmt::Display>(
     line(format_args!("{whole}"));
 }
 
-/// Displays a value, or `none` in place of a value that is missing.
+/// Displays a value, or `none` if the value is missing.
 #[derive(Clone, Copy, Debug)]
 pub struct OrNone<'a, T>(pub &'a Option<T>);
 
@@ -244,11 +243,11 @@ impl fmt::Display for Colours<'_> {
     }
 }
 
-/// Bytes in hex, nothing between them.
+/// Displays bytes in hex, without separators.
 struct Hex<'a>(&'a [u8]);
 
 impl fmt::Display for Hex<'_> {
-    /// A chunk at a time: a write for each byte takes most of a dump's time.
+    /// Writes a chunk at a time: one write for each byte would be most of a dump's time.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const DIGITS: &[u8; 16] = b"0123456789abcdef";
         for bytes in self.0.chunks(32) {
@@ -264,8 +263,8 @@ impl fmt::Display for Hex<'_> {
     }
 }
 
-/// Writes the checksums that stand for a dump: of the pixels of the page on the screen, line by
-/// line; of the palette; and with `content memory` of each plane.
+/// Writes checksums instead of a dump: of the pixels of the displayed page, line by line; of the palette; and
+/// with `content memory` of each plane.
 ///
 /// ```text
 /// page start 4b00 crc 0a0b0c0d

@@ -1,4 +1,4 @@
-//! Lines with their checksum.
+//! Framing: lines with a checksum.
 
 use core::fmt::{self, Write};
 
@@ -8,25 +8,25 @@ use crate::MAX_LINE;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// ` *` and eight digits.
+/// Length of ` *` and eight digits.
 const CHECKSUM: usize = 10;
 
-/// The CRC-32 (ISO-HDLC) of bytes that come in pieces.
+/// The CRC-32 (ISO-HDLC) of bytes that arrive in pieces.
 #[derive(Clone)]
 pub struct Checksum(Digest<'static, u32>);
 
 impl Checksum {
-    /// Of nothing.
+    /// Returns the checksum of no bytes.
     pub fn new() -> Self {
         Self(CRC.digest())
     }
 
-    /// Takes the next bytes in.
+    /// Adds the next bytes.
     pub fn add(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
     }
 
-    /// The checksum of all of them.
+    /// Returns the checksum of all bytes so far.
     pub fn value(&self) -> u32 {
         self.0.clone().finalize()
     }
@@ -44,10 +44,10 @@ impl fmt::Debug for Checksum {
     }
 }
 
-/// Bytes that are collected before they are summed and sent.
+/// Bytes that are collected before they are added to the checksum and sent.
 const CHUNK: usize = 64;
 
-/// The text of a line on its way out: made printable, cut, summed.
+/// Writer for the text of a line: makes it printable, cuts it to length, and computes its checksum.
 struct Summed<F> {
     send: F,
     checksum: Checksum,
@@ -84,8 +84,9 @@ impl<F: FnMut(&[u8])> Write for Summed<F> {
     }
 }
 
-/// Writes `text` as a line: checksum and LF at its end. What is not printable ASCII goes out as
-/// `?`, and text beyond [`MAX_LINE`] is left out, so that every line written is a legal one.
+/// Writes `text` as a line that ends in its checksum and LF. Each character that is not printable ASCII
+/// becomes `?`, and text that would make the line longer than [`MAX_LINE`] is cut off, so every line written
+/// is legal.
 pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
     let mut summed = Summed {
         send,
@@ -94,11 +95,11 @@ pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
         chunk: [0; CHUNK],
         collected: 0,
     };
-    // The writer never fails, and what a Display implementation makes of that is its own.
+    // The writer never fails. A `Display` implementation may, and the line then ends where it failed.
     let _ = summed.write_fmt(text);
     summed.flush();
     let sum = summed.checksum.value();
-    // The tail is no part of the text: it must always fit, and is not summed.
+    // The checksum itself must always fit, and is not added to the checksum.
     summed.room = CHECKSUM + 1;
     let _ = write!(summed, " *{sum:08x}");
     summed.chunk[summed.collected] = b'\n';
@@ -111,11 +112,11 @@ pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
 pub enum FrameError {
     /// The line has no ` *xxxxxxxx` at its end.
     NoChecksum,
-    /// The checksum is another one.
+    /// The checksum does not match the text.
     WrongChecksum {
-        /// What the line says.
+        /// The checksum in the line.
         said: u32,
-        /// What its text gives.
+        /// The checksum of the line's text.
         computed: u32,
     },
 }
@@ -134,10 +135,10 @@ impl fmt::Display for FrameError {
 
 impl core::error::Error for FrameError {}
 
-/// The text of a line that ends in its checksum.
+/// Returns the text of a line that ends in its checksum.
 ///
 /// # Errors
-/// A checksum that is missing or wrong.
+/// The checksum is missing or wrong.
 pub fn unframe(line: &str) -> Result<&str, FrameError> {
     let (text, digits) = line.rsplit_once(" *").ok_or(FrameError::NoChecksum)?;
     let lower_hex = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);
@@ -168,7 +169,7 @@ mod tests {
 
     #[test]
     fn a_line_comes_back() {
-        // The check value of the CRC's own definition.
+        // The check value in the CRC's definition.
         assert_eq!(line("123456789"), "123456789 *cbf43926\n");
         for text in ["", "ok", "a *b *c", "tab\tand umlaut \u{e4}"] {
             let line = line(text);

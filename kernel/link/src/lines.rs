@@ -1,34 +1,34 @@
-//! Bytes into lines.
+//! Assembly of received bytes into lines.
 
 use crate::{CANCEL, MAX_LINE};
 
-/// Backspace and Delete: either takes the last byte of a line back.
+/// Backspace and Delete: both remove the last byte of a line.
 const ERASE: [u8; 2] = [0x08, 0x7F];
 
-/// Collects bytes until a line is whole, in a fixed buffer.
+/// Collects bytes until a line is complete, in a fixed buffer.
 ///
 /// LF, CR, and CR LF each end a line: a host sends LF, the Enter key of a terminal sends CR, and some
-/// programs send both. Backspace and Delete take the last byte back, [`CANCEL`] the whole line.
+/// programs send both. Backspace and Delete remove the last byte, and [`CANCEL`] removes the whole line.
 #[derive(Clone, Debug)]
 pub struct Lines {
-    /// The line's first bytes.
+    /// The bytes of the line that fit.
     bytes: [u8; MAX_LINE],
-    /// The line's length. Bytes past the buffer are counted, so that they can be taken back.
+    /// The line's length. Bytes beyond the buffer are counted too, so that they can be removed again.
     len: usize,
-    /// The last byte was a CR: an LF right after it ends no other line.
+    /// The last byte was a CR, so an LF right after it does not end another line.
     returned: bool,
     /// Bytes of this line were lost or damaged.
     damaged: bool,
 }
 
-/// Why a line was thrown away.
+/// Why a line was discarded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Noise {
-    /// It is longer than [`MAX_LINE`].
+    /// The line is longer than [`MAX_LINE`].
     TooLong,
-    /// It has a byte that is not printable ASCII.
+    /// The line has a byte that is not printable ASCII.
     NotText(u8),
-    /// Bytes of it were lost or damaged on the wire ([`Lines::damage`]).
+    /// Bytes of the line were lost or damaged on the wire ([`Lines::damage`]).
     Damaged,
 }
 
@@ -43,7 +43,7 @@ impl core::fmt::Display for Noise {
 }
 
 impl Lines {
-    /// Nothing collected.
+    /// Returns an empty buffer.
     pub const fn new() -> Self {
         Self {
             bytes: [0; MAX_LINE],
@@ -53,15 +53,15 @@ impl Lines {
         }
     }
 
-    /// Notes that bytes may be missing here, or that the next byte is not the one that was sent: the
-    /// line that the next byte belongs to is refused, unless it is cancelled.
+    /// Notes that bytes may be missing here, or that the next byte arrived damaged. The line that the next
+    /// byte belongs to is refused, unless it is cancelled.
     pub fn damage(&mut self) {
         self.damaged = true;
-        // An LF belonged to the CR, or bytes between the two are lost.
+        // Bytes between the CR and an LF may be lost, so an LF now ends a line.
         self.returned = false;
     }
 
-    /// Takes a byte. Returns the line if the byte ends it, or why there is none.
+    /// Adds a byte. If the byte ends a line, returns the line, or why it was discarded.
     pub fn push(&mut self, byte: u8) -> Option<Result<&str, Noise>> {
         let returned = core::mem::replace(&mut self.returned, byte == b'\r');
         match byte {
@@ -85,7 +85,7 @@ impl Lines {
         }
     }
 
-    /// The line so far, and begins the next one.
+    /// Returns the line so far, and begins the next.
     fn end(&mut self) -> Result<&str, Noise> {
         let len = core::mem::take(&mut self.len);
         if core::mem::take(&mut self.damaged) {
@@ -130,7 +130,7 @@ mod tests {
             lines(b"a\nb c\r\n\nd\re\r\n\r\n\r\rf"),
             ["a", "b c", "", "d", "e", "", "", ""].map(ok)
         );
-        // Whatever stands between the two, the LF ends a line of its own.
+        // With any byte between CR and LF, the LF ends another line.
         assert_eq!(lines(b"a\r \x08\nb\r\x18\n"), ["a", "", "b", ""].map(ok));
     }
 
@@ -140,9 +140,9 @@ mod tests {
             lines(b"shp\x08ow\x7f\x7f\x7fhow 1\n\x08\x7fhold\r"),
             ["show 1", "hold"].map(ok)
         );
-        // What is not text is taken back like any byte.
+        // Bytes that are not text can be removed like any other.
         assert_eq!(lines(b"a\xff\x08b\n"), [ok("ab")]);
-        // And what is too long.
+        // So can bytes beyond the buffer.
         let mut bytes = std::vec![b'x'; MAX_LINE + 2];
         bytes.extend([0x7F; 2]);
         bytes.push(b'\n');
@@ -207,7 +207,7 @@ mod tests {
         );
     }
 
-    /// Any bytes: the same lines as from a text editor that has all the room in the world.
+    /// Any bytes give the same lines as a text editor with unlimited space.
     #[test]
     fn any_bytes_give_the_lines_of_a_simple_model() {
         let mut random = seeded::generator();

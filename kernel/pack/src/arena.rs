@@ -1,10 +1,10 @@
-//! Where a pack's mesh is unpacked.
+//! The memory that a pack's mesh is unpacked into.
 
 use scene::{Corner, Face, MAX_VERTICES, Vec3};
 
 use crate::{MAX_ALL_CORNERS, MAX_FACES};
 
-/// Room for the largest mesh. About half a MiB: meant for a static.
+/// Memory for the largest mesh, about half a MiB. It is meant for a static.
 #[derive(Clone, Copy, Debug)]
 pub struct Arena {
     pub(crate) vertices: [Vec3; MAX_VERTICES],
@@ -13,7 +13,7 @@ pub struct Arena {
 }
 
 impl Arena {
-    /// Empty, all of it zeros: in an image it takes no room.
+    /// Returns an empty arena. It is all zeros, so it occupies no space in an image.
     pub const fn new() -> Self {
         Self {
             vertices: [[0; 3]; MAX_VERTICES],
@@ -38,7 +38,7 @@ impl Default for Arena {
     }
 }
 
-/// Puts items at the front of a place, and returns them there.
+/// Copies items to the front of `place`, and returns that part of `place`.
 pub(crate) fn fill<T>(place: &mut [T], items: impl ExactSizeIterator<Item = T>) -> &[T] {
     let filled = &mut place[..items.len()];
     for (to, item) in filled.iter_mut().zip(items) {

@@ -1,4 +1,4 @@
-//! Why bytes are no pack.
+//! Why bytes are not a legal pack.
 
 use core::fmt;
 
@@ -7,52 +7,52 @@ use texmap::TextureError;
 
 use crate::{MAX_BYTES, VERSION};
 
-/// Why bytes are no pack that can be shown. Things are numbered from 0.
+/// Why bytes are not a pack that can be shown. Vertices, corners, faces and colours are numbered from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PackError {
-    /// They do not begin with [`crate::MAGIC`].
+    /// The bytes do not begin with [`crate::MAGIC`].
     NoPack,
-    /// So many bytes: fewer than a header has.
+    /// The pack has this many bytes, fewer than a header.
     Short(usize),
-    /// So many bytes: more than [`MAX_BYTES`].
+    /// The pack has this many bytes, more than [`MAX_BYTES`].
     TooLong(usize),
-    /// Another version of the format.
+    /// The pack has this version of the format, which is not [`VERSION`].
     Version(u32),
-    /// There are other than the header says.
+    /// The length in the header is wrong.
     Length {
-        /// Bytes by the header.
+        /// Length in the header.
         said: u32,
-        /// Bytes that there are.
+        /// Length of the pack.
         actual: usize,
     },
-    /// A byte was changed.
+    /// The checksum in the header is wrong: a byte was changed.
     Checksum {
-        /// What the header says.
+        /// Checksum in the header.
         said: u32,
-        /// What the bytes give.
+        /// Checksum of the bytes.
         computed: u32,
     },
-    /// More of something than there is room for.
+    /// The pack has more items of a kind than the limit.
     TooMany {
-        /// Of what.
+        /// The kind of item.
         what: &'static str,
-        /// How many.
+        /// How many items the pack has.
         count: usize,
-        /// How many there may be.
+        /// How many items are allowed.
         most: usize,
     },
-    /// What the header counts takes another number of bytes.
+    /// The counts in the header do not match the length of the pack.
     Parts {
-        /// Bytes that it takes.
+        /// Bytes that the counted parts need.
         parts: usize,
-        /// Bytes that there are.
+        /// Length of the pack.
         actual: usize,
     },
-    /// The texture can't be one.
+    /// The texture is not legal.
     Texture(TextureError),
-    /// This entry of the palette has a part that no 6 bits hold.
+    /// This entry of the palette has a part that does not fit 6 bits.
     Colour(usize),
-    /// This vertex is too far out.
+    /// This vertex is too far from the origin.
     Vertex(usize),
     /// A corner refers to a vertex that does not exist.
     CornerVertex {
@@ -63,17 +63,17 @@ pub enum PackError {
         /// Vertices that exist.
         vertices: usize,
     },
-    /// This corner is outside of the texture.
+    /// The texture coordinates of this corner are outside the texture.
     CornerPlace(usize),
     /// This face has too few or too many corners.
     FaceCorners(usize),
-    /// This face's normal is no unit vector.
+    /// This face's normal is not a unit vector.
     FaceNormal(usize),
-    /// The faces take another number of corners.
+    /// The faces' counts of corners do not add up to the corners of the pack.
     Shared {
-        /// Corners that they take.
+        /// Corners that the faces use.
         used: usize,
-        /// Corners that there are.
+        /// Corners that the pack has.
         there: usize,
     },
 }

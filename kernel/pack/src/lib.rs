@@ -1,11 +1,11 @@
-//! Packs: a model as it is handed to the kernel, and to the emulated card's program.
+//! Packs: the file format of a model, for the kernel and for the host program with the emulated VGA.
 //!
-//! The host computes everything once: mesh, texels, palette and light table. Kernel and host then
-//! read the same bytes, so that they draw the same picture, and a pack's checksum says of what.
+//! The host computes everything once: mesh, texels, palette and light table. Kernel and host then read the
+//! same bytes, so they draw the same frame, and a pack's checksum identifies the model.
 //!
 //! # The format, version 1
 //!
-//! All numbers are little-endian, and nothing lies between two parts:
+//! All numbers are little-endian, and the parts follow each other without gaps:
 //!
 //! | bytes | what |
 //! | --- | --- |
@@ -13,26 +13,26 @@
 //! | 4 | [`VERSION`] |
 //! | 4 | length of the whole pack in bytes |
 //! | 4 | checksum: the CRC-32 (ISO-HDLC) of all bytes after it |
-//! | 2, 2, 2 | how many vertices V, corners C and faces F there are |
+//! | 2, 2, 2 | the numbers of vertices V, corners C and faces F |
 //! | 2, 2 | the texture's width W and height H |
 //! | 256 x 3 | palette: the DAC's colours, red, green and blue, each 0 to 63 |
-//! | 24 x 256 | light table: for each level what each texel becomes, an entry of the palette |
+//! | 24 x 256 | light table: for each light level and texel an entry of the palette |
 //! | 240 | background: for each scan line an entry of the palette |
 //! | W x H | texels, row by row from the top left |
 //! | V x 12 | vertices: x right, y down, z away from the viewer, signed, 16.16 |
-//! | C x 10 | corners of all faces: 2 which vertex, 4 u and 4 v in the texture, 16.16 texels |
-//! | F x 8 | faces: 2 how many of the corners, which follow those of the face before; three times 2 the outward unit normal, signed, 14 fraction bits |
+//! | C x 10 | corners of all faces: 2 bytes of vertex index, 4 of u and 4 of v in the texture, 16.16 texels |
+//! | F x 8 | faces: 2 bytes with the number of corners, which follow those of the face before; three times 2 bytes of the outward unit normal, signed, 14 fraction bits |
 //!
-//! A texel is not a colour: the light table makes one of it. So texels and palette may be reduced
-//! each by itself.
+//! A texel is not a colour: the light table turns it into a colour. So texels and palette can be reduced
+//! independently.
 //!
-//! # What is checked
+//! # Checks
 //!
-//! [`Pack::parse`] takes nothing on trust, for the bytes may come from anywhere. With its checksum
-//! any change by accident is found. But one can be made on purpose that fits, so every count,
-//! index and range is checked by itself: a scene made of an accepted pack is within every limit
-//! that [`scene::Stage`] and the mappers have, and can make none of them panic. Whether it is
-//! beautiful is not checked: faces may be bent, inside out or nowhere.
+//! [`Pack::parse`] trusts nothing, because the bytes may come from anywhere. The checksum finds any
+//! accidental change. But a pack can be forged with a matching checksum, so every count, index and range is
+//! also checked. A scene made of an accepted pack is within every limit of [`scene::Stage`] and the mappers,
+//! and can make none of them panic. Whether the scene looks good is not checked: faces may be bent, inside
+//! out or invisible.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -50,18 +50,18 @@ use texmap::Texture;
 pub use arena::Arena;
 pub use error::PackError;
 
-/// How a pack begins.
+/// First bytes of a pack.
 pub const MAGIC: [u8; 8] = *b"CBALPACK";
 /// Version of the format.
 pub const VERSION: u32 = 1;
-/// Most corners of all its faces: those of as many triangles.
+/// Most corners of all faces together: as many as the largest number of triangles has.
 pub const MAX_ALL_CORNERS: usize = 3 * MAX_FACES;
 /// Longest pack in bytes.
 pub const MAX_BYTES: usize = 512 * 1024;
 
-/// Magic, version, length and checksum: what comes before the bytes that are summed.
+/// Bytes of magic, version, length and checksum, which come before the bytes that the checksum covers.
 const SUMMED: usize = 20;
-/// All that comes before the palette.
+/// Bytes before the palette.
 const HEADER: usize = SUMMED + 10;
 const PALETTE: usize = 256 * 3;
 const LIGHT: usize = LIGHT_LEVELS * 256;
@@ -69,7 +69,7 @@ const VERTEX: usize = 12;
 const CORNER: usize = 10;
 const FACE: usize = 8;
 
-// The counts' limits keep within that of the bytes.
+// A pack with the largest counts still fits `MAX_BYTES`.
 const _: () = assert!(
     HEADER
         + PALETTE
@@ -82,28 +82,28 @@ const _: () = assert!(
         <= MAX_BYTES
 );
 
-/// Furthest that the square of a normal's length may be from 2^28, that of a unit vector: each
-/// part may be rounded up or down by a whole unit. The light takes a power of it that longer
-/// ones would carry out of 64 bits.
+/// Largest difference of a normal's squared length from 2^28, that of a unit vector: rounding may change each
+/// part by one unit. The light raises a product with the normal to the 32nd power, and longer normals would
+/// overflow 64 bits.
 const NORMAL_SLACK: i64 = 1 << 16;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// What a pack is made of.
+/// The content of a pack.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<'a> {
     /// The solid.
     pub mesh: Mesh<'a>,
-    /// What covers it.
+    /// The texture that covers the solid.
     pub texture: Texture<'a>,
     /// Palette and light table.
     pub colours: Colours<'a>,
-    /// The colour of each scan line where there is no solid.
+    /// The palette entry of each scan line where the solid does not cover it.
     pub background: &'a [u8; HEIGHT],
 }
 
 impl Parts<'_> {
-    /// The pack's bytes, given to `sink` in pieces, in their order, from the palette on.
+    /// Passes the pack's bytes from the palette on to `sink`, in pieces and in order.
     fn body(&self, sink: &mut impl FnMut(&[u8])) {
         sink(self.colours.palette.as_flattened());
         sink(self.colours.light.as_flattened());
@@ -127,9 +127,9 @@ impl Parts<'_> {
         }
     }
 
-    /// Writes the pack, in pieces; returns its checksum. What is beyond a limit is written as it
-    /// is, and [`Pack::parse`] refuses it. Faces take the corners one after the other, and all of
-    /// them the one texture, whatever `first` and `texture` say.
+    /// Writes the pack in pieces, and returns its checksum. Values beyond a limit are written as they are;
+    /// [`Pack::parse`] refuses them. The faces use the corners one after the other, and all faces use the one
+    /// texture; their `first` and `texture` are ignored.
     pub fn write(&self, mut sink: impl FnMut(&[u8])) -> u32 {
         let Mesh {
             vertices,
@@ -162,7 +162,7 @@ impl Parts<'_> {
     }
 }
 
-/// A pack that was found whole and within all limits. It borrows the bytes.
+/// A pack whose bytes have been checked. It borrows the bytes.
 #[derive(Clone, Copy, Debug)]
 pub struct Pack<'p> {
     checksum: u32,
@@ -174,20 +174,20 @@ pub struct Pack<'p> {
     faces: &'p [[u8; FACE]],
 }
 
-/// Takes parts off the front of bytes.
+/// A reader that removes parts from the front of bytes.
 struct Reader<'p> {
     rest: &'p [u8],
 }
 
 impl<'p> Reader<'p> {
-    /// The next `len` bytes. They are there: the length was compared with the sum of all parts.
+    /// Returns the next `len` bytes. They exist, because the length was compared with the sum of all parts.
     fn take(&mut self, len: usize) -> &'p [u8] {
         let (part, rest) = self.rest.split_at(len);
         self.rest = rest;
         part
     }
 
-    /// The next `count` records of N bytes.
+    /// Returns the next `count` records of N bytes.
     fn records<const N: usize>(&mut self, count: usize) -> &'p [[u8; N]] {
         let (records, _) = self.take(count * N).as_chunks();
         records
@@ -195,15 +195,15 @@ impl<'p> Reader<'p> {
 }
 
 impl<'p> Pack<'p> {
-    /// Reads a pack, and checks all of it.
+    /// Parses a pack, and checks all of it.
     ///
     /// # Errors
-    /// The first thing that is not as it must be.
+    /// The first value that is not legal.
     pub fn parse(bytes: &'p [u8]) -> Result<Self, PackError> {
         if bytes.len() > MAX_BYTES {
             return Err(PackError::TooLong(bytes.len()));
         }
-        // Of something else altogether, say that it is no pack, and not that it is short.
+        // Check the magic first: bytes of another kind are reported as no pack, not as a short pack.
         if !bytes.starts_with(&MAGIC) {
             return Err(PackError::NoPack);
         }
@@ -212,7 +212,7 @@ impl<'p> Pack<'p> {
             .ok_or(PackError::Short(bytes.len()))?;
         let word = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
         let long = |at: usize| u32::from(word(at)) | u32::from(word(at + 2)) << 16;
-        // The length and the checksum may have other places in another version.
+        // Another version may have its length and checksum in other places.
         let version = long(8);
         if version != VERSION {
             return Err(PackError::Version(version));
@@ -301,7 +301,7 @@ impl<'p> Pack<'p> {
             if (length - (1 << 28)).abs() > NORMAL_SLACK {
                 return Err(PackError::FaceNormal(i));
             }
-            // At most MAX_FACES MAX_CORNERS.
+            // The sum is at most MAX_FACES x MAX_CORNERS.
             first += usize::from(face.corners);
         }
         if first != self.corners.len() {
@@ -313,12 +313,12 @@ impl<'p> Pack<'p> {
         Ok(())
     }
 
-    /// The checksum in its header: what tells one pack from another.
+    /// Returns the checksum in the header, which identifies the pack.
     pub fn checksum(&self) -> u32 {
         self.checksum
     }
 
-    /// Its scene, the mesh unpacked into `arena`.
+    /// Returns the pack's scene. Its mesh is unpacked into `arena`.
     pub fn entry<'a>(&self, arena: &'a mut Arena) -> Entry<'a>
     where
         'p: 'a,
@@ -338,14 +338,14 @@ impl<'p> Pack<'p> {
             vertices: arena::fill(vertices, self.vertices.iter().map(vertex)),
             corners: arena::fill(corners, self.corners.iter().map(corner)),
             faces: arena::fill(faces, faces_of),
-            // Nobody vouches for a file's solid.
+            // A file's solid may be concave, so it is never assumed to be convex.
             convex: false,
         };
         Entry::loaded(mesh, self.texture, self.colours, self.background)
     }
 }
 
-/// A part of a fixed size.
+/// Converts a part to its fixed size.
 fn whole<T, const N: usize>(part: &[T]) -> &[T; N] {
     part.try_into().expect("it was cut to this size")
 }
@@ -365,7 +365,7 @@ fn corner(bytes: &[u8; CORNER]) -> Corner {
     }
 }
 
-/// A face whose first corner is `first`, at most [`MAX_ALL_CORNERS`] in an accepted pack.
+/// Returns a face whose first corner is `first`, which is at most [`MAX_ALL_CORNERS`] in an accepted pack.
 fn face_at(bytes: &[u8; FACE], first: usize) -> Face {
     let (words, _) = bytes.as_chunks();
     Face {
@@ -388,7 +388,7 @@ mod tests {
 
     const SIDES: (u16, u16) = (7, 5);
 
-    /// The cube of the catalogue with a small texture.
+    /// Returns a pack with the catalogue's cube and a small texture.
     fn cube() -> Vec<u8> {
         let cube = Entry::parse("cube").unwrap().scene(&[]);
         let mut corners = cube.mesh.corners.to_vec();
@@ -415,7 +415,7 @@ mod tests {
         bytes
     }
 
-    /// A change to a pack that is made to fit its length and checksum.
+    /// Returns a changed pack whose length and checksum match the change.
     fn forged(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
         let mut bytes = cube();
         change(&mut bytes);
@@ -522,7 +522,7 @@ mod tests {
             let error = Pack::parse(&bytes).unwrap_err().to_string();
             assert!(error.contains(why), "{error}, and not {why}");
         }
-        // As far from a unit vector as rounding may take a normal: 2^28 + 2^16.
+        // The largest normal that rounding may produce is accepted: a squared length of 2^28 + 2^16.
         Pack::parse(&put(FACES + 2, &[0, 64, 0, 1, 0, 0])).unwrap();
         let mut long = cube();
         long.push(0);

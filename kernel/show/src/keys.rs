@@ -1,31 +1,32 @@
-//! Keys: scancodes in, actions out.
+//! The key map: from scan codes to actions.
 //!
-//! Codes are scan code set 1, as the keyboard controller hands them on. A key is known by its place:
-//! the letters are those of a US keyboard there.
+//! Codes are in scan code set 1, as the keyboard controller sends them. A key is identified by its position;
+//! the letters are those that a US keyboard has there.
 //!
-//! A key that is held down repeats. What turns, approaches or steps takes the repeats, and all else
-//! only the push. Codes can get lost, where a machine is too busy to take them: a release that is
-//! lost costs the next push of that key, since it looks like a repeat, and no more.
+//! A key that is held down repeats. Actions that turn, approach or step act on every repeat; all other
+//! actions act only on the first push. Codes can get lost when a machine is too busy to fetch them. If a
+//! release is lost, the next push of that key looks like a repeat and may do nothing; the loss has no other
+//! effect.
 
 use core::fmt;
 
 use link::Action;
 use pc_keyboard::{KeyCode, KeyState, ScancodeSet, ScancodeSet1};
 
-/// What a key does.
+/// A key and its action.
 #[derive(Clone, Copy, Debug)]
 pub struct Key {
-    /// The keys' name, for people.
+    /// The key's name, for people.
     pub name: &'static str,
-    /// The key, and another one that does the same.
+    /// The key, and a second key with the same action. They are equal if no second key exists.
     codes: [KeyCode; 2],
-    /// What it does.
+    /// What the key does.
     pub action: Action,
-    /// A line about it, for people.
+    /// A one-line description, for people.
     pub about: &'static str,
 }
 
-/// Every key that does something; of the actions each once, but for the hint that names a key.
+/// All keys that have an action. Each action has one entry, except the hint, which has no key.
 pub const KEYS: &[Key] = &[
     key(
         "Left",
@@ -147,7 +148,7 @@ const fn key(name: &'static str, codes: [KeyCode; 2], action: Action, about: &'s
     }
 }
 
-/// Whether a key that is held down does it again and again.
+/// Returns whether an action acts on every repeat of a key that is held down.
 fn repeats(action: Action) -> bool {
     matches!(
         action,
@@ -165,15 +166,15 @@ fn repeats(action: Action) -> bool {
     )
 }
 
-/// A keyboard: which keys are down.
+/// A keyboard's state: which keys are down.
 pub(crate) struct Keyboard {
     set: ScancodeSet1,
-    /// A bit for each [`KeyCode`].
+    /// One bit for each [`KeyCode`].
     down: u128,
 }
 
 impl Keyboard {
-    /// No key is down.
+    /// Returns a keyboard with no key down.
     pub const fn new() -> Self {
         Self {
             set: ScancodeSet1::new(),
@@ -181,9 +182,9 @@ impl Keyboard {
         }
     }
 
-    /// Takes a code; with the last one of a push that does something, what that is.
+    /// Handles a code. Returns the action if the code completes a push that has one.
     pub fn push(&mut self, code: u8) -> Option<Action> {
-        // A code that is none is passed over: the next one starts anew.
+        // An invalid code is ignored; the decoder starts afresh with the next code.
         let event = self.set.advance_state(code).ok()??;
         let bit = 1u128 << (event.code as u8 & 127);
         let again = self.down & bit != 0;
@@ -211,8 +212,8 @@ mod tests {
     use super::*;
     use std::vec::Vec;
 
-    /// Codes of set 1: a letter's push is one byte, its release the same with bit 7; an arrow's has
-    /// E0 before it.
+    /// Codes of set 1: a letter's push is one byte, its release is that byte with bit 7 set, and an arrow's
+    /// code follows E0.
     const A: u8 = 0x1E;
     const M: u8 = 0x32;
     const LEFT: u8 = 0x4B;
@@ -239,7 +240,7 @@ mod tests {
         codes.dedup();
         let twins = KEYS.iter().filter(|key| key.codes[0] == key.codes[1]);
         assert_eq!(codes.len(), all - twins.count());
-        // The bits of `Keyboard::down`.
+        // Every code fits a bit of `Keyboard::down`.
         assert!((KeyCode::Unknown as u8) < 128);
     }
 
@@ -249,7 +250,7 @@ mod tests {
         let left = [EXTENDED, LEFT];
         let held = actions(&mut keyboard, &[left; 5].concat());
         assert_eq!(held, [Action::YawLeft; 5]);
-        // Another key meanwhile: repeats are its own from then on.
+        // After another key is pushed, the keyboard repeats that key instead.
         let held = actions(&mut keyboard, &[M, M, M, A, A, M | UP, A, M]);
         let [m, a] = [Action::NextMapper, Action::RollLeft];
         assert_eq!(held, [m, a, a, a, m]);
@@ -265,7 +266,7 @@ mod tests {
             actions(&mut keyboard, &[M, M, M | UP, M]),
             [Action::NextMapper; 2]
         );
-        // So was a prefix, on either side: keypad 4 is no key, and neither is E0 M.
+        // A prefix was lost, on either side: keypad 4 has no action, and neither has E0 M.
         let mut keyboard = Keyboard::new();
         assert_eq!(
             actions(&mut keyboard, &[LEFT, LEFT | UP, EXTENDED, M, M]),
@@ -273,7 +274,7 @@ mod tests {
         );
     }
 
-    /// Whatever comes: no panic, and a key works after it.
+    /// Any bytes: no panic, and a key works afterwards.
     #[test]
     fn noise_is_harmless() {
         let mut random = seeded::generator();

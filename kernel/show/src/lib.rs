@@ -1,15 +1,15 @@
-//! The program: pictures, one after the other, and answers to commands.
+//! The demo: draws one frame after the other and answers commands.
 //!
-//! Running, it draws the picture of each tick as long as the machine keeps up, and skips ticks
-//! when it does not: the motion keeps its pace. Held, it draws what `show` names and touches no
-//! video memory between commands, so that what is on the screen can be taken as evidence.
+//! A running demo draws the frame of each tick for as long as the machine keeps up, and skips ticks when it
+//! does not, so the motion keeps its pace. A held demo draws what `show` names and touches no video memory
+//! between commands, so the screen's content can serve as evidence.
 //!
-//! A running show is steered, by keys and by commands, and notes that (`steering`): held, it
-//! draws the picture of any tick of what was noted.
+//! Keys and commands steer a running demo. The demo logs them (`steering`), and a held demo draws the frame
+//! of any tick from that log.
 //!
-//! It knows nothing of the machine: a card behind a [`modex::Bus`], bytes in, lines out, and the
-//! tick as an argument. The kernel gives it the bare machine's card and its serial line, a test
-//! the emulated card and a list; the same commands then bring the same answers.
+//! The demo knows nothing of the machine. It has a card behind a [`modex::Bus`], receives bytes, writes
+//! lines, and gets the tick as an argument. The kernel passes the bare machine's card and its serial line; a
+//! test passes the emulated VGA and a list. The same commands then give the same answers.
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -39,18 +39,19 @@ pub use split::HEAT;
 use split::Split;
 use steering::{Log, NotNoted, Notes, Scenes, State};
 
-/// The program's version, as its first line and `version` tell it.
+/// The program's version, as the kernel's first line and `version` print it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// What the overlay puts behind a mapper's name if so many faces were drawn in reduced quality.
+/// Returns the mark that the overlay puts behind a mapper's name: `~` if any faces (`lowered`) were drawn in
+/// reduced quality.
 fn lower_mark(lowered: u32) -> &'static str {
     if lowered > 0 { "~" } else { "" }
 }
 
-/// Where an answer's lines go, each without its checksum.
+/// A sink for an answer's lines, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
-/// The fixed memory of the program. About 2.5 MiB: meant for a static.
+/// The fixed memory of the demo, about 2.5 MiB. It is meant for a static.
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
     model: Arena,
@@ -62,7 +63,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// Empty.
+    /// Returns empty memory.
     pub const fn new() -> Self {
         Self {
             model: Arena::new(),
@@ -81,68 +82,70 @@ impl Default for Memory {
     }
 }
 
-/// What only the machine can do.
+/// A request that only the machine can carry out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
-    /// Break in this way.
+    /// Fail in this way.
     Fail(Fault),
-    /// End, as asked to.
+    /// End the program, as `leave` asks.
     Leave,
 }
 
-/// The picture on the screen: all that a dump's header needs to draw it again, but for the scene.
+/// The frame on the screen: everything except the scene that a dump's header needs to draw it again.
 #[derive(Clone, Copy, Debug)]
 struct Shown {
     picture: Picture,
-    /// The motion that decided which faces are drawn in reduced quality, if there are such faces.
+    /// The motion that decided which faces are drawn in reduced quality; `None` if all faces have full
+    /// quality.
     motion: Option<Motion>,
     mapper: Mapper,
 }
 
-/// How the running show keeps up with the ticks.
+/// How a running demo keeps up with the ticks.
 #[derive(Clone, Copy, Debug, Default)]
 struct Pace {
-    /// The tick of the last picture.
+    /// The tick of the last frame.
     last: Option<u32>,
-    /// Pictures shown.
+    /// Number of frames shown.
     pictures: u32,
-    /// Pictures that came more than a tick after the one before.
+    /// Number of frames that came more than one tick after the frame before.
     late: u32,
 }
 
-/// A card, and the scene that is shown on it.
+/// A card, and the demo that draws on it.
 #[derive(Debug)]
 pub struct Show<'a, B> {
     card: ModeX<Counted<B>>,
-    /// The checksum of the pack that the loaded model is of.
+    /// The checksum of the pack that contains the loaded model.
     pack: Option<u32>,
-    /// What the next picture depends on, and what that came from.
+    /// The state that the next frame depends on; `log` says how it came about.
     state: State<'a>,
     log: Log<'a>,
     overlay: Overlay<'a>,
     keyboard: Keyboard,
-    /// The keyboard's codes: taken, and lost before.
+    /// Codes from the keyboard: handled by the demo, and lost before it fetched them.
     codes: (u32, u32),
-    /// What went wrong on the serial line.
+    /// Errors of the serial line.
     reception: Reception,
-    /// Where the scene's texture is painted.
+    /// The memory that the scene's texture is painted into.
     texels: &'a mut [u8; MAX_TEXELS],
     stage: Stage<'a>,
     offscreen: &'a mut Offscreen,
     lines: Lines,
-    /// The picture on the screen; nothing after a reset of the card.
+    /// The frame on the screen; `None` after a reset of the card.
     shown: Option<Shown>,
-    /// What drawing the last picture took.
+    /// Counts of what was drawn for the last frame.
     drawn: Stats,
-    /// The largest error of the last picture, if it was split.
+    /// The largest error in the last frame if it was a split view, and 0 otherwise, in 2^-16 texel.
     most: u32,
-    /// Nothing while the show is held.
+    /// `None` while the demo is held.
     pace: Option<Pace>,
 }
 
 impl<'a, B: Bus> Show<'a, B> {
-    /// Paints the default scene into `memory` and sets the card's mode. The show runs. With a
-    /// `pack` its model is a scene beside the built-in ones, and the default; otherwise the ball is.
+    /// Paints the default scene into `memory`, sets the card's mode, and starts a running demo. The model of
+    /// `pack` becomes a scene beside the built-in ones, and the default. Without a pack, the ball is the
+    /// default.
     ///
     /// # Errors
     /// As [`ModeX::set`]: nothing can be drawn on this card.
@@ -172,17 +175,17 @@ impl<'a, B: Bus> Show<'a, B> {
         })
     }
 
-    /// The card.
+    /// Returns the card's bus.
     pub fn bus(&mut self) -> &mut B {
         self.card.bus().inner()
     }
 
-    /// Whether the show runs and the picture of `tick` is not on the screen yet.
+    /// Returns whether the demo runs and the frame of `tick` is not on the screen yet.
     pub fn is_due(&self, tick: u32) -> bool {
         self.pace.is_some_and(|pace| pace.last != Some(tick))
     }
 
-    /// Shows the running show's picture of `tick`.
+    /// Shows the running demo's frame of `tick`.
     pub fn present(&mut self, tick: u32, out: &mut Out<'_>) {
         self.draw_at(tick);
         let Some(pace) = &mut self.pace else { return };
@@ -194,39 +197,39 @@ impl<'a, B: Bus> Show<'a, B> {
         }
     }
 
-    /// Says how many microseconds the last picture took: only the machine has a clock for that.
+    /// Sets how many microseconds the last frame needed. Only the machine has a clock for that.
     pub fn took(&mut self, micros: u32) {
         self.overlay.took(micros);
     }
 
-    /// Takes a code of the keyboard, scan code set 1. A held show is not steered by keys.
+    /// Handles a code of the keyboard, in scan code set 1. Keys do not steer a held demo.
     pub fn key(&mut self, code: u8, tick: u32) {
         self.codes.0 = self.codes.0.wrapping_add(1);
         if let Some(action) = self.keyboard.push(code)
             && self.pace.is_some()
         {
-            // An action has no name that could be wrong.
+            // An action contains no name that could be unknown.
             let _ = self.steer(tick, Change::Act(action));
         }
     }
 
-    /// Says how many codes the machine could not keep until they were fetched, since its start.
+    /// Sets how many codes the machine has lost since its start because the demo did not fetch them in time.
     pub fn set_lost_keys(&mut self, codes: u32) {
         self.codes.1 = codes;
     }
 
-    /// Says what went wrong on the way of the serial line's bytes, since the machine's start.
+    /// Sets the serial line's errors since the machine's start.
     pub fn set_reception(&mut self, reception: Reception) {
         self.reception = reception;
     }
 
-    /// Says that bytes of the serial line may be missing before the next one, or that the next one
-    /// is damaged: its line is refused ([`Lines::damage`]).
+    /// Marks the serial line as damaged: bytes before the next byte may be missing, or the next byte arrived
+    /// damaged. The line of the next byte is refused ([`Lines::damage`]).
     pub fn damage(&mut self) {
         self.lines.damage();
     }
 
-    /// Takes a byte of the serial line; with the one that ends a line, obeys it.
+    /// Handles a byte from the serial line. A byte that ends a line carries the line's command out.
     pub fn receive(&mut self, byte: u8, tick: u32, out: &mut Out<'_>) -> Option<Request> {
         let command = match self.lines.push(byte)? {
             Ok(line) => Command::parse(line),
@@ -244,7 +247,7 @@ impl<'a, B: Bus> Show<'a, B> {
         }
     }
 
-    /// Carries a command out and answers it.
+    /// Carries a command out and writes its answer.
     pub fn obey(&mut self, command: Command, tick: u32, out: &mut Out<'_>) -> Option<Request> {
         match command {
             Command::Hold => {
@@ -318,7 +321,7 @@ impl<'a, B: Bus> Show<'a, B> {
         (command == Command::Leave).then_some(Request::Leave)
     }
 
-    /// Carries `show` out; nothing if that was refused, and told.
+    /// Carries `show` out. Returns `None`, after writing why, if the command is refused.
     fn show(&mut self, picture: Picture, motion: Option<Motion>, out: &mut Out<'_>) -> Option<()> {
         let most = Pose::MAX_DISTANCE;
         let Some(pose) = pose(&self.state.entry, picture) else {
@@ -344,7 +347,7 @@ impl<'a, B: Bus> Show<'a, B> {
         Some(())
     }
 
-    /// Draws a picture on the next page, and flips. With the pose of the next tick the picture is drawn
+    /// Draws a frame on the next page, and flips. With `next`, the pose at the next tick, the frame is drawn
     /// in reduced quality.
     fn draw(&mut self, picture: Picture, pose: &Pose, next: Option<Pose>, overlay: bool) {
         self.card.bus().take_counts();
@@ -374,7 +377,7 @@ impl<'a, B: Bus> Show<'a, B> {
             }
         };
         self.card.flip();
-        // A motion that reduces no face's quality makes no difference: it is not part of the name.
+        // A motion that reduces no face's quality makes no difference, so it is not part of the name.
         let reduced = next.filter(|_| self.stage.lowered() > 0);
         self.shown = Some(Shown {
             picture,
@@ -383,7 +386,7 @@ impl<'a, B: Bus> Show<'a, B> {
         });
     }
 
-    /// Draws the picture of a tick on the next page, and flips.
+    /// Draws the frame of a tick on the next page, and flips.
     fn draw_at(&mut self, tick: u32) {
         let pose = self.state.pose(tick);
         let own = pose == self.state.entry.pose(tick);
@@ -397,7 +400,7 @@ impl<'a, B: Bus> Show<'a, B> {
         self.draw(picture, &pose, next, overlay);
     }
 
-    /// Whether there is an overlay for the picture of a tick; if so it is ready.
+    /// Prepares the overlay for the frame of a tick. Returns whether the frame has an overlay.
     fn prepare_overlay(&mut self, tick: u32) -> bool {
         let counts = self.card.bus().counts();
         let (stage, state) = (&mut self.stage, &self.state);
@@ -416,7 +419,7 @@ impl<'a, B: Bus> Show<'a, B> {
         })
     }
 
-    /// Changes the running show at the first tick that has no picture yet, and notes it.
+    /// Changes the running demo, from the first tick whose frame is not drawn yet, and logs the change.
     fn steer(&mut self, tick: u32, change: Change) -> Result<(), steering::Unknown> {
         let drawn = self.pace.is_some_and(|pace| pace.last == Some(tick));
         let tick = if drawn { tick.wrapping_add(1) } else { tick };
@@ -429,7 +432,7 @@ impl<'a, B: Bus> Show<'a, B> {
             self.reset();
         }
         match change {
-            // What was before makes no difference any more.
+            // A reset starts from defaults, so earlier changes no longer matter.
             Change::Act(Action::Reset) => self.log.restart(next),
             _ if changed => self.log.keep(tick, change),
             _ => {}
@@ -437,7 +440,7 @@ impl<'a, B: Bus> Show<'a, B> {
         Ok(())
     }
 
-    /// Carries `steer` out; nothing if that was refused, and told.
+    /// Carries `steer` out. Returns `None`, after writing why, if the command is refused.
     fn obey_steer(
         &mut self,
         at: Option<u32>,
@@ -482,7 +485,7 @@ impl<'a, B: Bus> Show<'a, B> {
         None
     }
 
-    /// Sets something by name; nothing if there is no such name, and that was told.
+    /// Changes a setting to a name. Returns `None`, after writing why, if the name is unknown.
     fn set(&mut self, setting: Setting, name: Word, tick: u32, out: &mut Out<'_>) -> Option<()> {
         let change = Change::Set(setting, name);
         let set = match self.pace {
@@ -491,7 +494,7 @@ impl<'a, B: Bus> Show<'a, B> {
                 let mut next = self.state;
                 next.change(tick, &change).map(|_| {
                     let put = self.adopt(next);
-                    // It is known, then.
+                    // The name is known: the change to `next` succeeded.
                     let _ = self.log.start().change(tick, &change);
                     if put || setting == Setting::Scene {
                         self.reset();
@@ -502,8 +505,8 @@ impl<'a, B: Bus> Show<'a, B> {
         known(set, change, out)
     }
 
-    /// Has the next picture drawn as `state` says. Returns whether another scene is on the stage: its
-    /// palette and background are others, so the card must be reset.
+    /// Makes `state` the state of the next frame. Returns whether the scene changed. The new scene has
+    /// another palette and background, so the caller must then reset the card.
     #[must_use]
     fn adopt(&mut self, state: State<'a>) -> bool {
         let entry = state.entry;
@@ -519,7 +522,7 @@ impl<'a, B: Bus> Show<'a, B> {
         put
     }
 
-    /// Tells what a setting can be set to.
+    /// Lists the values of a setting.
     fn list(&self, setting: Setting, out: &mut Out<'_>) {
         let mut tell = |set: bool, name: &str, about: &str| {
             let mark = if set { "*" } else { "" };
@@ -548,15 +551,15 @@ impl<'a, B: Bus> Show<'a, B> {
         }
     }
 
-    /// Stops the show. Returns whether it ran: the card must then be reset, so that what follows
-    /// depends on the commands alone, and not on how far the show had come.
+    /// Stops the demo. Returns whether it ran. The caller must then reset the card, so that later frames
+    /// depend on the commands alone, and not on how far the demo had come.
     #[must_use]
     fn hold(&mut self) -> bool {
         self.overlay.close();
         self.pace.take().is_some()
     }
 
-    /// Sets the card's mode and palette again: no picture is on it.
+    /// Sets the card's mode and palette again. No frame is on the card afterwards.
     fn reset(&mut self) {
         self.shown = None;
         (self.drawn, self.most) = (Stats::default(), 0);
@@ -583,13 +586,13 @@ impl<'a, B: Bus> Show<'a, B> {
         }
     }
 
-    /// Waits until the last flip holds, and tells which page is on the screen.
+    /// Waits until the last flip takes effect, and writes which page is on the screen.
     fn tell_page(&mut self, out: &mut Out<'_>) {
         self.card.settle();
         out(format_args!("page {}", self.card.shown_page()));
     }
 
-    /// Tells the log as the commands that bring it back.
+    /// Writes the log as the commands that restore it.
     fn tell_log(&mut self, out: &mut Out<'_>) {
         let start = *self.log.start();
         out(format_args!("{} {}", Setting::Scene, start.entry.name));
@@ -677,8 +680,8 @@ impl<'a, B: Bus> Show<'a, B> {
     }
 }
 
-/// Draws a picture, or the split view of it. What the picture took, and its largest error, if that is
-/// looked at.
+/// Draws a frame, or its split view. Returns counts of what was drawn, and the largest error in 2^-16 texel:
+/// 0 if the frame is not split.
 fn paint(
     stage: &mut Stage<'_>,
     split: Option<&Split>,
@@ -691,7 +694,7 @@ fn paint(
     }
 }
 
-/// The pose of a scene's picture; none if it is outside the legal range.
+/// Returns the pose that a frame's name stands for, or `None` if its distance is outside the legal range.
 pub fn pose(scene: &Entry<'_>, picture: Picture) -> Option<Pose> {
     match picture {
         Picture::Frame(frame) => Some(scene.pose(frame)),
@@ -712,7 +715,7 @@ pub fn pose(scene: &Entry<'_>, picture: Picture) -> Option<Pose> {
     }
 }
 
-/// The pose a tick after `pose`; none if its distance is outside the legal range.
+/// Returns the pose one tick after `pose`, or `None` if its distance is outside the legal range.
 fn moved(pose: &Pose, motion: Motion) -> Option<Pose> {
     let distance = pose.distance.wrapping_add(motion.distance as i32);
     (0..=Pose::MAX_DISTANCE)
@@ -725,7 +728,7 @@ fn moved(pose: &Pose, motion: Motion) -> Option<Pose> {
         })
 }
 
-/// The motion from a pose to the one of the next tick.
+/// Returns the motion from a pose to the pose of the next tick.
 fn motion(pose: &Pose, next: &Pose) -> Motion {
     Motion {
         yaw: next.yaw.wrapping_sub(pose.yaw),
@@ -735,7 +738,7 @@ fn motion(pose: &Pose, next: &Pose) -> Motion {
     }
 }
 
-/// Tells if a change was none, since it names nothing that there is.
+/// Reports an unknown name; the state did not change.
 fn known(changed: Result<(), steering::Unknown>, change: Change, out: &mut Out<'_>) -> Option<()> {
     if let (Err(steering::Unknown), Change::Set(setting, name)) = (changed, change) {
         out(format_args!(
@@ -745,7 +748,7 @@ fn known(changed: Result<(), steering::Unknown>, change: Change, out: &mut Out<'
     changed.ok()
 }
 
-/// The name of a pose.
+/// Returns the name of a pose.
 fn name(pose: &Pose) -> Picture {
     Picture::Pose {
         yaw: pose.yaw,
@@ -755,7 +758,7 @@ fn name(pose: &Pose) -> Picture {
     }
 }
 
-/// Bytes in hex, a space between.
+/// Displays bytes in hex, separated by spaces.
 struct Bytes<'a>(&'a [u8]);
 
 impl fmt::Display for Bytes<'_> {

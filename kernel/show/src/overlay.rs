@@ -1,12 +1,12 @@
-//! What is written over a running show: the keys, figures of the pictures, and a hint.
+//! The overlay of a running demo: the list of keys, figures of the frames, and a hint.
 //!
-//! Writing is white or yellow, with a black outline, so that it reads on any picture. It is drawn
-//! after the picture and counted apart; plane after plane, so that all of it takes four writes to Map
-//! Mask, and as columns, a run of pixels at a time. The pages know what they were drawn on, so nothing
-//! else has to remember where something was written.
+//! Text is white or yellow with a black outline, so that it is legible on any frame. The overlay is drawn
+//! after the frame and counted separately. It is drawn plane by plane, so that all of it needs four writes to
+//! Map Mask, and in columns, one span of pixels at a time. The pages know what they were drawn on, so nothing
+//! else has to remember where text was written.
 //!
-//! The figures are those of the half second before, or they could not be read. None of this exists
-//! while the show is held.
+//! The figures are those of the half second before; figures that changed with every frame would be illegible.
+//! A held demo has no overlay.
 
 use core::array;
 use core::fmt::{self, Write};
@@ -21,27 +21,27 @@ use crate::palette::nearest;
 use crate::split::{self, Split};
 use crate::{KEYS, lower_mark};
 
-/// Ticks between one writing of the figures and the next.
+/// Ticks between two updates of the figures.
 const RENEWAL: u32 = 30;
-/// Ticks that a hint stays.
+/// Ticks that a hint stays on the screen.
 const HINT: u32 = 300;
-/// Columns from a letter to the next.
+/// Columns from one letter to the next.
 const ADVANCE: usize = font::WIDTH + 1;
 /// Lines from one line of letters to the next.
 const LINE: usize = font::HEIGHT + 2;
-/// Where the writing begins.
+/// Distance of the text from the screen's borders, in pixels.
 const MARGIN: usize = 4;
 
-/// What writing can be.
+/// A colour of text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Ink {
     /// White.
     Plain,
-    /// Yellow, for what stands out.
+    /// Yellow, for emphasis.
     Bright,
 }
 
-/// The pixels of a screen column, from the top down, as bits.
+/// A set of pixels of a screen column, one bit each, from the top down.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Column([u64; HEIGHT.div_ceil(64)]);
 
@@ -60,7 +60,7 @@ impl Column {
         Self(array::from_fn(|i| self.0[i] | other.0[i]))
     }
 
-    /// With the pixels above and below each one.
+    /// Returns the set extended by the pixels directly above and below each of its pixels.
     fn spread(self) -> Self {
         let word = |i: usize| self.0.get(i).copied().unwrap_or(0);
         Self(array::from_fn(|i| {
@@ -70,7 +70,8 @@ impl Column {
         }))
     }
 
-    /// The first pixel from `y` on that is set, or is not.
+    /// Returns the first y from `y` on whose pixel is in the set (or, if `set` is false, is not); `HEIGHT` if
+    /// no pixel is.
     fn next(&self, y: usize, set: bool) -> usize {
         let mut from = y;
         while from < HEIGHT {
@@ -87,7 +88,7 @@ impl Column {
         HEIGHT
     }
 
-    /// Each run of pixels that are set: its first, and the one after its last.
+    /// Returns each span of pixels in the set: its first y, and the y after its last.
     fn runs(self) -> impl Iterator<Item = (usize, usize)> {
         let mut y = 0;
         core::iter::from_fn(move || {
@@ -98,7 +99,7 @@ impl Column {
     }
 }
 
-/// Writing on the screen, a bit a pixel. About 20 KiB, all zeros when empty.
+/// Text on the screen, one bit a pixel. About 20 KiB, all zeros when empty.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Writing {
     plain: [Column; WIDTH],
@@ -106,7 +107,7 @@ pub(crate) struct Writing {
 }
 
 impl Writing {
-    /// Nothing written.
+    /// Returns an empty screen.
     pub const fn new() -> Self {
         Self {
             plain: [Column::EMPTY; WIDTH],
@@ -114,14 +115,14 @@ impl Writing {
         }
     }
 
-    /// Wipes everything.
+    /// Erases all text.
     pub fn wipe(&mut self) {
         self.plain = [Column::EMPTY; WIDTH];
         self.bright = [Column::EMPTY; WIDTH];
     }
 
-    /// Writes a line with its top left at (x, y), and returns the column after it. What leaves the
-    /// screen, or its outline would, is left out.
+    /// Writes a line with its top left corner at (x, y), and returns the x after its last letter. Pixels that
+    /// are outside the screen, or whose outline would be, are left out.
     pub fn write(&mut self, ink: Ink, x: usize, y: usize, text: fmt::Arguments<'_>) -> usize {
         let mut pen = Pen {
             columns: match ink {
@@ -131,12 +132,12 @@ impl Writing {
             x,
             y,
         };
-        // The pen never fails, and what a Display implementation makes of that is its own.
+        // The pen never fails. A `Display` implementation may, and the text then ends where it failed.
         let _ = pen.write_fmt(text);
         pen.x
     }
 
-    /// Draws it.
+    /// Draws the text with its outline.
     pub fn draw(&self, inks: &Inks, destination: &mut impl Destination) {
         let at = |x: usize| match (self.plain.get(x), self.bright.get(x)) {
             (Some(plain), Some(bright)) => plain.or(*bright),
@@ -170,7 +171,7 @@ impl Writing {
     }
 }
 
-/// Where the next letter goes.
+/// The position of the next letter.
 struct Pen<'a> {
     columns: &'a mut [Column; WIDTH],
     x: usize,
@@ -194,7 +195,7 @@ impl Write for Pen<'_> {
     }
 }
 
-/// The colours of writing.
+/// Palette entries for text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Inks {
     plain: u8,
@@ -203,7 +204,7 @@ pub(crate) struct Inks {
 }
 
 impl Inks {
-    /// Those of a palette, whatever it holds.
+    /// Returns the entries of a palette that are nearest to white, yellow and black.
     pub fn of(palette: &Palette) -> Self {
         Self {
             plain: nearest(palette, [63, 63, 63]),
@@ -213,24 +214,24 @@ impl Inks {
     }
 }
 
-/// What is told of the pictures.
+/// The figures that the overlay shows.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Figures {
     pub scene: &'static str,
     pub mapper: Mapper,
     pub order: Order,
     pub paused: bool,
-    /// Faces of the last picture in lower quality, if quality is lower where motion hides it.
+    /// Faces of the last frame in reduced quality; `None` if reduced quality is off.
     pub lowered: Option<u32>,
-    /// Of the last picture.
+    /// Pixels of the last frame.
     pub pixels: u32,
-    /// Of the last picture, its overlay aside.
+    /// Writes to Map Mask for the last frame, without its overlay.
     pub map_masks: u64,
-    /// Of the last picture, if it was split: the largest error, in 2^-16 texel.
+    /// The largest error of the last frame if it was a split view, in 2^-16 texel.
     pub most: u32,
 }
 
-/// Pictures since a tick.
+/// Frames since a tick, and the microseconds that they needed.
 #[derive(Clone, Copy, Debug, Default)]
 struct Window {
     since: u32,
@@ -238,7 +239,7 @@ struct Window {
     micros: u64,
 }
 
-/// What is written over the pictures, and when it was.
+/// What is drawn over the frames, and its timing.
 #[derive(Debug)]
 pub(crate) struct Overlay<'a> {
     writing: &'a mut Writing,
@@ -248,15 +249,15 @@ pub(crate) struct Overlay<'a> {
     split: bool,
     colours: Split,
     hint: Option<u32>,
-    /// Something else is to be written than is.
+    /// The overlay text changed and must be redrawn.
     stale: bool,
     window: Window,
-    /// The last window that was whole: tenths of a picture a second, microseconds a picture.
+    /// Figures of the last complete window: tenths of a frame a second, and microseconds a frame.
     pace: Option<(u32, u32)>,
 }
 
 impl<'a> Overlay<'a> {
-    /// Nothing, to be written in the colours of `palette`.
+    /// Returns an empty overlay that uses the colours of `palette`.
     pub fn new(writing: &'a mut Writing, palette: &Palette) -> Self {
         Self {
             writing,
@@ -272,29 +273,29 @@ impl<'a> Overlay<'a> {
         }
     }
 
-    /// Nothing any more.
+    /// Switches the overlay off.
     pub fn close(&mut self) {
         (self.help, self.info, self.split, self.hint) = (false, false, false, None);
         self.stale = true;
     }
 
-    /// What is told has changed.
+    /// Marks the text as outdated, because the demo's state has changed.
     pub fn renew(&mut self) {
         self.stale = true;
     }
 
-    /// The palette is another one.
+    /// Changes the palette.
     pub fn set_palette(&mut self, palette: &Palette) {
         self.inks = Inks::of(palette);
         self.colours = Split::of(palette);
     }
 
-    /// How pictures are split, if they are.
+    /// Returns how to draw the split view, if it is on.
     pub fn split(&self) -> Option<&Split> {
         Some(&self.colours).filter(|_| self.split)
     }
 
-    /// Takes an action, if it is the overlay's.
+    /// Handles an action of the overlay; ignores all other actions.
     pub fn act(&mut self, tick: u32, action: Action) {
         match action {
             Action::Help => self.help = !self.help,
@@ -306,13 +307,13 @@ impl<'a> Overlay<'a> {
         self.stale = true;
     }
 
-    /// A picture took so many microseconds.
+    /// Adds the microseconds that drawing a frame needed.
     pub fn took(&mut self, micros: u32) {
         self.window.micros += u64::from(micros);
     }
 
-    /// Whether there is anything to draw over the picture of `tick`; if so it is written. `motion`
-    /// finds out how what is seen moves in a tick.
+    /// Prepares the overlay for the frame of `tick`. Returns whether the overlay shows anything. `motion` is
+    /// called only if needed, and measures how the visible texture moves in a tick.
     pub fn prepare(
         &mut self,
         tick: u32,
@@ -324,7 +325,7 @@ impl<'a> Overlay<'a> {
             let Window {
                 pictures, micros, ..
             } = self.window;
-            // Not of pictures that were not shown: the show may just have begun.
+            // No pace after a long gap: the demo may just have begun.
             if pictures > 0 && ticks < 100 * RENEWAL {
                 let tenths = pictures * 10 * TICKS_PER_SECOND / ticks;
                 self.pace = Some((tenths, (micros / u64::from(pictures)) as u32));
@@ -365,7 +366,7 @@ impl<'a> Overlay<'a> {
         self.help || self.info || self.split || self.hint.is_some()
     }
 
-    /// Draws what was prepared.
+    /// Draws the prepared overlay.
     pub fn draw(&self, destination: &mut impl Destination) {
         if let Some(split) = self.split() {
             split.draw_frame(destination);
@@ -404,7 +405,7 @@ impl<'a> Overlay<'a> {
         let y = split::LEGEND_Y + split::LEGEND_LINES + 3;
         for (step, text) in [(1, "1/256"), (split::TEXEL, "1"), (split::STEPS - 1, "64")] {
             let begins = split::LEGEND_X + step * split::LEGEND_STEP;
-            // Two letters end where the last step does.
+            // A two-letter label ends where its step ends.
             let x = begins - ADVANCE * usize::from(text.len() == 2);
             write(Ink::Plain, x, y, format_args!("{text}"));
         }
@@ -453,7 +454,8 @@ impl<'a> Overlay<'a> {
             );
             if let Some((least, most)) = sweet_spot {
                 let (ink, verdict) = match pixels {
-                    // So long after each other that what crawls is half a period off already.
+                    // Frames are so far apart that any motion too fast to crawl is already more than half a
+                    // period.
                     _ if least > most => (Ink::Plain, ": too few frames"),
                     0 => (Ink::Plain, ""),
                     _ if pixels < least => (Ink::Plain, ": too slow"),
@@ -468,7 +470,7 @@ impl<'a> Overlay<'a> {
             Some(faces) if mapper.lower().is_some() => {
                 line(Ink::Plain, format_args!("faces in lower quality: {faces}"));
             }
-            // Or the key would seem to do nothing.
+            // Without this line the key would seem to have no effect.
             Some(_) => line(Ink::Plain, format_args!("no lower quality than {mapper}")),
             None => {}
         }
@@ -478,18 +480,18 @@ impl<'a> Overlay<'a> {
     }
 }
 
-/// How far what is seen moves from picture to picture, in pixels, and from where to where the eye
-/// joins that into motion. Nothing if it is not known how fast pictures come.
+/// Returns how far the visible texture moves from one frame to the next, and the range in which the eye sees
+/// that as motion (the sweet spot), in 2^-16 pixel. `None` if the frame rate is unknown.
 fn moved(motion: Option<Motion>, pace: Option<(u32, u32)>) -> Option<(u32, Option<(u32, u32)>)> {
     let (motion, (tenths, _)) = motion.zip(pace)?;
-    // Ticks a picture, 16.16.
+    // Ticks a frame, 16.16.
     let ticks = ((10 * TICKS_PER_SECOND) << 16).checked_div(tenths)?;
     let pixels = (u64::from(motion.pixels) * u64::from(ticks)) >> 16;
     let pixels = u32::try_from(pixels).unwrap_or(u32::MAX);
     Some((pixels, motion.sweet_spot(ticks, TICKS_PER_SECOND)))
 }
 
-/// A number with 16 fraction bits, cut to hundredths.
+/// A number with 16 fraction bits, displayed with two decimals, rounded down.
 struct Hundredths(u32);
 
 impl fmt::Display for Hundredths {
@@ -515,7 +517,8 @@ mod tests {
         outline: 3,
     };
 
-    /// By the definition: a letter's pixels in its ink, those around them black, and no other.
+    /// Checks the definition: pixels of letters have their ink, pixels around them are black, and all others
+    /// are untouched.
     #[test]
     fn letters_have_an_outline_and_touch_nothing_else() {
         let mut writing = Box::new(Writing::new());
@@ -568,8 +571,8 @@ mod tests {
         assert!(MARGIN + KEYS.len() * LINE < HEIGHT);
     }
 
-    /// The text that is written from (x, y) on up to a gap of three letters, in capitals, since small
-    /// letters look the same; and its ink.
+    /// Reads the text from (x, y) on, up to a gap of three letters, with its ink. The text is in capitals,
+    /// because small letters look the same.
     fn read(writing: &Writing, x: usize, y: usize) -> Option<(Ink, String)> {
         let letter = |columns: &[Column; WIDTH], x: usize| {
             let has = |row: usize, column: usize| columns[x + column].has(y + row);
@@ -583,13 +586,13 @@ mod tests {
         inks.into_iter().find_map(|(ink, columns)| {
             let letters = (x..WIDTH - ADVANCE).step_by(ADVANCE);
             let text: String = letters.map(|x| letter(columns, x).unwrap_or('?')).collect();
-            // Behind the text another one may follow.
+            // Another text may follow after the gap.
             let text = text.split("   ").next()?.trim_end();
             (!text.is_empty()).then(|| (ink, text.into()))
         })
     }
 
-    /// The lines of text from the top left down.
+    /// Returns the lines of text from the top left down.
     fn lines(overlay: &Overlay<'_>) -> Vec<(Ink, String)> {
         let lines = (MARGIN..HEIGHT - LINE).step_by(LINE);
         lines
@@ -608,7 +611,7 @@ mod tests {
         map_masks: 678,
     };
 
-    /// A pixel and a half a tick, a quarter of half a period.
+    /// A motion of 1.5 pixels a tick, a quarter of half a period.
     const MOTION: Motion = Motion {
         pixels: 3 << 15,
         part: 1 << 14,
@@ -618,7 +621,7 @@ mod tests {
         Overlay::new(writing, CATALOGUE[0].scene(&[]).palette)
     }
 
-    /// What the info says after half a second of pictures, each `every` ticks after the one before.
+    /// Returns the lines of `info` after a second of frames, `every` ticks apart.
     fn info(every: u32, figures: &Figures, motion: Option<Motion>) -> Vec<(Ink, String)> {
         let mut writing = Box::new(Writing::new());
         let mut overlay = overlay(&mut writing);
@@ -653,7 +656,7 @@ mod tests {
             bright("sweet spot 0.19 to 6.00"),
         ];
         assert_eq!(info(1, &FIGURES, Some(MOTION))[5..], moves);
-        // Four ticks a frame: four times the motion, and steps that come a quarter as often.
+        // Four ticks a frame: four times the motion, and the lower end is four times as large.
         let slow = info(4, &FIGURES, Some(MOTION));
         assert_eq!(slow[2], plain("15.0 frames/s  2.56 ms"));
         let moves = [
@@ -717,7 +720,7 @@ mod tests {
         );
     }
 
-    /// Figures that change with every picture could not be read.
+    /// The figures change twice a second, because figures that changed with every frame would be illegible.
     #[test]
     fn info_changes_twice_a_second_and_knows_no_pace_over_a_gap() {
         let mut writing = Box::new(Writing::new());
@@ -735,7 +738,7 @@ mod tests {
             [plain("4.0 frames/s  0.00 ms"), plain("3 pixels")]
         );
         assert_eq!(pixels(59, 4)[3], plain("3 pixels"));
-        // A gap of 50 seconds and more is no pace.
+        // A gap of 50 seconds or more gives no pace.
         assert_eq!(pixels(30 + 2999, 5)[2], plain("0.0 frames/s  0.00 ms"));
         assert_eq!(
             pixels(30 + 2999 + 3000, 6)[2..4],

@@ -1,4 +1,4 @@
-//! Colours in a palette that may hold any.
+//! Nearest colours in an arbitrary palette.
 
 use modex::{Palette, Rgb6};
 

@@ -1,10 +1,11 @@
-//! The split view: one picture three times, as the set mapper draws it, exact, and its error.
+//! The split view: one frame three times, drawn by the current mapper, drawn exactly, and as its error.
 //!
-//! Each window shows the same 104 columns from the middle of the picture. They are a multiple of four
-//! columns apart, so each of the picture's columns keeps its plane, and no mapper knows of it.
+//! Each window shows the same 104 columns from the middle of the frame. The windows are multiples of four
+//! columns away from those columns, so each column of the frame keeps its plane, and no mapper has to know
+//! about the split view.
 //!
-//! The error is a heat map: black and blue are fractions of a texel that no one sees, teal is up to a
-//! texel, gold some texels, rose and white what is far off.
+//! The error is a heat map: black and blue are invisible fractions of a texel, teal is up to one texel, gold
+//! is a few texels, and rose and white are large errors.
 
 use core::ops::Range;
 
@@ -14,44 +15,44 @@ use texmap::{Mapper, Stats};
 
 use crate::palette::nearest;
 
-/// The columns of the picture that are shown.
+/// The columns of the frame that each window shows.
 const COLUMNS: Range<u16> = 108..212;
-/// Where each window begins.
+/// First column of each window.
 pub(crate) const WINDOWS: [usize; 3] = [0, 108, 216];
-/// Columns of a window.
+/// Columns in a window.
 const WINDOW: usize = COLUMNS.end as usize - COLUMNS.start as usize;
 const _: () = assert!(WINDOWS[2] + WINDOW == WIDTH);
 
-/// Steps of the heat map: below 1/256 texel, then a step each time the error doubles, and 64 texels
-/// and more.
+/// Steps of the heat map: the first is below 1/256 texel, each further step begins where the error has
+/// doubled, and the last is 64 texels and more.
 pub(crate) const STEPS: usize = 16;
-/// The step at which a texel is reached.
+/// The step that begins at one texel.
 pub(crate) const TEXEL: usize = 9;
-/// 1/256 texel, in 2^-16 texel, as a power of two.
+/// Binary logarithm of 1/256 texel in units of 2^-16 texel: where the first step ends.
 const FIRST: u32 = 8;
 
-/// Columns of a step in the legend, lines of it, and where it is.
+/// Columns of a step in the legend. The constants after it are the legend's lines, left border and top.
 pub(crate) const LEGEND_STEP: usize = 6;
 pub(crate) const LEGEND_LINES: usize = 5;
 pub(crate) const LEGEND_X: usize = WINDOWS[2] + (WINDOW - STEPS * LEGEND_STEP) / 2;
 pub(crate) const LEGEND_Y: usize = HEIGHT - 29;
 
-/// The heat map's colours. A palette that has them shows the steps apart.
+/// The heat map's colours. In a palette that contains them, the steps are distinct.
 #[rustfmt::skip]
 pub const HEAT: [Rgb6; STEPS] = [
-    [ 1,  1,  7], [ 3,  4, 17], [ 6,  7, 26], [10, 13, 37], [15, 19, 48], // to 1/16
-    [ 8, 27, 49], [ 5, 34, 39], [15, 44, 46], [26, 54, 53], // to 1
-    [46, 28,  8], [55, 40, 14], [62, 51, 20], // to 8
+    [ 1,  1,  7], [ 3,  4, 17], [ 6,  7, 26], [10, 13, 37], [15, 19, 48], // up to 1/16
+    [ 8, 27, 49], [ 5, 34, 39], [15, 44, 46], [26, 54, 53], // up to 1
+    [46, 28,  8], [55, 40, 14], [62, 51, 20], // up to 8
     [48, 11, 36], [61, 35, 47], [63, 58, 60], [63, 63, 63],
 ];
 
-/// The heat map's step of an error in 2^-16 texel.
+/// Returns the heat map's step for an error in 2^-16 texel.
 fn step(error: u32) -> usize {
     let log = error.checked_ilog2().unwrap_or(0);
     (log + 1).saturating_sub(FIRST).min(STEPS as u32 - 1) as usize
 }
 
-/// Colours of the heat map in a palette.
+/// The palette entries of the heat map.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Split {
     heat: [u8; STEPS],
@@ -59,7 +60,7 @@ pub(crate) struct Split {
 }
 
 impl Split {
-    /// Those of a palette, whatever it holds.
+    /// Returns the entries of a palette that are nearest to the heat map's colours.
     pub fn of(palette: &Palette) -> Self {
         Self {
             heat: HEAT.map(|colour| nearest(palette, colour)),
@@ -67,8 +68,8 @@ impl Split {
         }
     }
 
-    /// Draws the three windows. Returns what the first one took, and the largest error in the last,
-    /// in 2^-16 texel.
+    /// Draws the three windows. Returns the counts of the first window, and the largest error in the last, in
+    /// 2^-16 texel.
     pub fn draw(
         &self,
         stage: &mut Stage<'_>,
@@ -88,7 +89,7 @@ impl Split {
         (stats, most)
     }
 
-    /// Draws what is between the windows, and the heat map's legend.
+    /// Draws the bars between the windows, and the heat map's legend.
     pub fn draw_frame(&self, destination: &mut impl Destination) {
         let (left, top) = (LEGEND_X, LEGEND_Y);
         for plane in 0..4 {

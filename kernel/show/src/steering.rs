@@ -1,58 +1,58 @@
-//! Steering: what the pictures of a running show depend on, and how it is changed.
+//! Steering: the state that a running demo's frames depend on, and its changes.
 //!
-//! A picture is a function of [`State`] and a tick, and a state changes at ticks alone: what was
-//! changed, and when, is all that there is to know of a show. So the [`Log`] of it brings the same
-//! pictures again, on any machine and however many ticks that one skips.
+//! A frame is a function of a [`State`] and a tick, and a state changes only at ticks. So the changes and
+//! their ticks, which the [`Log`] stores, define every frame: the log gives the same frames again on any
+//! machine, however many ticks that machine skips.
 //!
 //! # Motion
 //!
-//! The scene moves by itself: its pose at a time is [`Entry::pose`]. Steering lets that time pass
-//! faster or slower, and adds a turn about each axis and a distance. Rates are integers a tick;
-//! a change takes all up that has come together since the last one and starts anew from its tick,
-//! so nothing is ever summed up tick by tick, and no error grows.
+//! Each scene has its own motion: its pose at a time is [`Entry::pose`]. Steering lets that time pass faster
+//! or slower, and adds a turn about each axis and a distance. Rates are integers per tick. A change first
+//! accumulates the motion since the last change, and then becomes the new starting point. So nothing is
+//! summed tick by tick, and no error grows.
 //!
-//! Keys repeat. What a repeated key can do is bounded by the legal ranges, so holding one down for an
-//! hour does no more than for a minute.
+//! Keys repeat. The legal ranges bound what a repeated key can do, so holding a key down for an hour does no
+//! more than holding it down for a minute.
 
 use link::{Action, Change, Setting, Word};
 use scene::Pose;
 use scene::catalogue::{CATALOGUE, Entry};
 use texmap::{Mapper, Order, Tolerance};
 
-/// One, with 16 fraction bits.
+/// One (1.0), with 16 fraction bits.
 const ONE: u32 = 1 << 16;
-/// What one push adds to a rate: 1/2880 turn a tick, a quarter of the ball's own turn.
+/// The rate that one push adds: 1/2880 turn a tick, a quarter of the ball's own rate.
 const PUSH: i32 = ((1u64 << 32) / 2880) as i32;
-/// Most pushes to one side: a turn in a second and a half.
+/// Most pushes to one side: one turn in a second and a half.
 const MAX_PUSHES: i32 = 32;
-/// What one step changes the distance by, 16.16: 1/16 unit.
+/// The change of distance in one step, 16.16: 1/16 unit.
 const STEP: i32 = 1 << 12;
-/// Most gears up or down; four double the speed, so it is up to 16 times faster or slower.
+/// Most gears up or down. Four gears double the speed, so the range is 1/16 to 16 times.
 const MAX_GEAR: i8 = 16;
 
-/// How the pose comes about.
+/// How the pose depends on the tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Motion {
-    /// The tick of the last change. What follows is as it was then.
+    /// The tick of the last change. The other fields describe the motion at that tick.
     since: u32,
     /// The scene's own time, in ticks with 16 fraction bits; 48 bits.
     time: u64,
-    /// Whether it passes.
+    /// Whether the scene's own time passes.
     own: bool,
-    /// What yaw, pitch and roll are turned by, in fractions of a turn.
+    /// The turn that steering adds to yaw, pitch and roll, in 32-bit fractions of a turn.
     turned: [u32; 3],
-    /// Pushes that each of them turns by.
+    /// Pushes on each angle, which give its rate.
     pushes: [i32; 3],
-    /// What the distance is more, 16.16.
+    /// The distance that steering adds, 16.16.
     distance: i32,
-    /// How fast all of it goes: 2^(gear / 4) times.
+    /// The speed of all motion: 2^(gear / 4) times.
     gear: i8,
-    /// Whether nothing moves, whatever the rates.
+    /// Whether all motion stands still, whatever the rates are.
     paused: bool,
 }
 
 impl Motion {
-    /// As the scene moves by itself.
+    /// The scene's own motion, not steered.
     const OWN: Self = Self {
         since: 0,
         time: 0,
@@ -64,7 +64,7 @@ impl Motion {
         paused: false,
     };
 
-    /// How many times faster the gear makes it, 16.16.
+    /// Returns the speed that the gear gives, 16.16.
     fn factor(&self) -> u32 {
         // 2^(0/4) to 2^(3/4), rounded to nearest.
         const QUARTERS: [u32; 4] = [ONE, 77_936, 92_682, 110_218];
@@ -75,15 +75,15 @@ impl Motion {
         }
     }
 
-    /// What each angle turns by in a tick, as a fraction of a turn.
+    /// Returns how much each angle turns in a tick, as a 32-bit fraction of a turn.
     fn rates(&self) -> [i32; 3] {
         let factor = i64::from(self.factor());
-        // 32 pushes of 16 times are less than a quarter of a turn.
+        // 32 pushes at 16 times the speed are less than a quarter of a turn, so the rate fits.
         self.pushes
             .map(|pushes| ((i64::from(pushes * PUSH) * factor) >> 16) as i32)
     }
 
-    /// The same motion, told from `tick` on.
+    /// Returns the same motion with `tick` as its starting point.
     fn at(&self, tick: u32) -> Self {
         self.after(if self.paused {
             0
@@ -97,7 +97,7 @@ impl Motion {
         Self { since, ..self }
     }
 
-    /// What it comes to after `ticks`, told from the same tick.
+    /// Returns the motion advanced by `ticks`, with its starting point unchanged.
     fn after(&self, ticks: u32) -> Self {
         let mut after = *self;
         if self.own {
@@ -110,14 +110,14 @@ impl Motion {
         after
     }
 
-    /// The pose at the motion's own tick.
+    /// Returns the pose at the motion's starting point.
     fn pose(&self, entry: &Entry<'_>) -> Pose {
         let tick = (self.time >> 16) as u32;
         let part = i64::from(self.time as u32 % ONE);
         let own = entry.pose(tick);
         self.steered(match part {
             0 => own,
-            // A slow scene would stand still for ticks, and then jump.
+            // Interpolate: a slowed-down scene would otherwise stand still for some ticks, and then jump.
             _ => {
                 let next = entry.pose(tick.wrapping_add(1));
                 between(&own, &entry.following(&own, next), part)
@@ -125,7 +125,7 @@ impl Motion {
         })
     }
 
-    /// The scene's own pose, turned and moved.
+    /// Adds the steered turn and distance to the scene's own pose.
     fn steered(&self, own: Pose) -> Pose {
         let [yaw, pitch, roll] = self.turned;
         Pose {
@@ -136,7 +136,7 @@ impl Motion {
         }
     }
 
-    /// Turns the angle number `angle` by a push more to one side.
+    /// Adds a push to one side to angle number `angle`.
     fn push(&mut self, angle: usize, side: i32) {
         self.pushes[angle] = (self.pushes[angle] + side).clamp(-MAX_PUSHES, MAX_PUSHES);
     }
@@ -162,14 +162,15 @@ impl Motion {
         (self.own, self.pushes, self.gear) = (false, [0; 3], 0);
     }
 
-    /// Moves by `step`, as far as the pose stays legal.
+    /// Changes the distance by `step`, as far as the pose stays legal.
     fn approach(&mut self, step: i32, entry: &Entry<'_>) {
         let here = self.pose(entry).distance;
         self.distance += (here + step).clamp(0, Pose::MAX_DISTANCE) - here;
     }
 }
 
-/// The pose a part, 16 fraction bits, of the way from one to another, each angle the shorter way.
+/// Returns the pose at `part`, with 16 fraction bits, of the way between two poses. Each angle goes the
+/// shorter way.
 fn between(from: &Pose, to: &Pose, part: i64) -> Pose {
     let angle = |a: u32, b: u32| {
         let way = i64::from(b.wrapping_sub(a) as i32);
@@ -184,62 +185,62 @@ fn between(from: &Pose, to: &Pose, part: i64) -> Pose {
     }
 }
 
-/// The scenes that there are: those of the catalogue, and the model that was loaded.
+/// The available scenes: the catalogue's, and the loaded model if one exists.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scenes<'a> {
     model: Option<Entry<'a>>,
 }
 
 impl<'a> Scenes<'a> {
-    /// With a model, or without.
+    /// Returns the catalogue's scenes and `model`, if given.
     pub fn new(model: Option<Entry<'a>>) -> Self {
         Self { model }
     }
 
-    /// All of them.
+    /// Returns all scenes, in order.
     pub fn all(&self) -> impl Iterator<Item = Entry<'a>> + use<'a> {
         CATALOGUE.iter().copied().chain(self.model)
     }
 
-    /// The scene of a show that was not told another one: the model, or the ball.
+    /// Returns the scene to begin with: the model, or the ball.
     pub fn default(&self) -> Entry<'a> {
         self.model.unwrap_or(CATALOGUE[0])
     }
 
-    /// The scene of a name.
+    /// Returns the scene with a name.
     fn named(&self, name: &str) -> Option<Entry<'a>> {
         self.all().find(|entry| entry.name == name)
     }
 
-    /// The scene after one, around the end.
+    /// Returns the scene after `entry`; after the last comes the first.
     fn after(&self, entry: &Entry<'a>) -> Entry<'a> {
         let mut rest = self.all().skip_while(|known| known.name != entry.name);
         rest.nth(1).unwrap_or(CATALOGUE[0])
     }
 }
 
-/// What a picture depends on, its tick aside.
+/// The state that a frame depends on, besides its tick.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct State<'a> {
     /// The scenes to choose from.
     pub scenes: Scenes<'a>,
-    /// The scene.
+    /// The current scene.
     pub entry: Entry<'a>,
-    /// How its textures are mapped.
+    /// The mapper of the scene's textures.
     pub mapper: Mapper,
-    /// In which order runs are drawn.
+    /// The order in which spans are drawn.
     pub order: Order,
-    /// Whether quality is lower where motion hides it.
+    /// Whether faces are drawn in reduced quality where motion hides it.
     pub lower: bool,
     motion: Motion,
 }
 
-/// A name that nothing has.
+/// The error that a name is unknown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Unknown;
 
 impl<'a> State<'a> {
-    /// A scene as it moves by itself, with the default settings.
+    /// Returns the state of a scene with its own motion and the default settings.
     pub fn of(scenes: Scenes<'a>, entry: Entry<'a>) -> Self {
         Self {
             scenes,
@@ -251,7 +252,7 @@ impl<'a> State<'a> {
         }
     }
 
-    /// The same settings, and the scene as it moves by itself.
+    /// Returns the same settings with the scene's own motion.
     pub fn unsteered(&self) -> Self {
         Self {
             motion: Motion::OWN,
@@ -259,26 +260,27 @@ impl<'a> State<'a> {
         }
     }
 
-    /// The pose at a tick, not before the last change.
+    /// Returns the pose at a tick. The tick is not before the last change.
     pub fn pose(&self, tick: u32) -> Pose {
         self.motion.at(tick).pose(&self.entry)
     }
 
-    /// The pose at the next tick, as one to which it moves there.
+    /// Returns the pose at the next tick, as a continuation of the pose at `tick`: without a jump where tiles
+    /// repeat.
     pub fn next_pose(&self, tick: u32) -> Pose {
         let next = self.pose(tick.wrapping_add(1));
         self.entry.following(&self.pose(tick), next)
     }
 
-    /// Whether nothing moves until that is said again.
+    /// Returns whether all motion is paused.
     pub fn is_paused(&self) -> bool {
         self.motion.paused
     }
 
-    /// Changes it at a tick, not before the last change. Whether that changes anything.
+    /// Applies a change at a tick, which is not before the last change. Returns whether the state changed.
     ///
     /// # Errors
-    /// A name that nothing has: nothing is changed.
+    /// The name is unknown. The state did not change.
     pub fn change(&mut self, tick: u32, change: &Change) -> Result<bool, Unknown> {
         let mut next = *self;
         match change {
@@ -302,8 +304,8 @@ impl<'a> State<'a> {
         self.motion = self.motion.at(tick);
         let (motion, entry) = (&mut self.motion, self.entry);
         match action {
-            // With a positive angle what looks at the viewer goes to the left, down, and the top
-            // to the right.
+            // With a positive yaw the side towards the viewer moves to the left, with a positive pitch it
+            // moves down, and with a positive roll the top moves to the right.
             Action::YawLeft => motion.push(0, 1),
             Action::YawRight => motion.push(0, -1),
             Action::PitchUp => motion.push(1, -1),
@@ -349,7 +351,7 @@ impl<'a> State<'a> {
         Ok(())
     }
 
-    /// Puts a scene there; another one starts as it moves by itself.
+    /// Changes the scene. A different scene starts with its own motion.
     fn put(&mut self, entry: Entry<'a>) {
         if entry.name != self.entry.name {
             self.entry = entry;
@@ -358,8 +360,8 @@ impl<'a> State<'a> {
     }
 }
 
-/// The mapper `steps` further on in the list, around its end. A tolerance that is not in the list
-/// stands where those begin.
+/// Returns the mapper `steps` further on in the list, which wraps. A tolerance that is not in the list counts
+/// as the first tolerance in the list.
 fn neighbour(mapper: Mapper, steps: usize) -> Mapper {
     let listed = |(_, known, _): &(_, Mapper, _)| match (mapper.name(), mapper, *known) {
         ("", Mapper::Within(_), Mapper::Within(_)) => true,
@@ -369,7 +371,8 @@ fn neighbour(mapper: Mapper, steps: usize) -> Mapper {
     Mapper::ALL[(here + steps) % Mapper::ALL.len()].1
 }
 
-/// `within-T` with another tolerance, as far as one is legal; from any other mapper `within-1`.
+/// Returns `within-T` with its tolerance changed by `other`, if the result is legal; for any other mapper,
+/// `within-1`.
 fn within(mapper: Mapper, other: fn(Tolerance) -> Option<Tolerance>) -> Mapper {
     match mapper {
         Mapper::Within(tolerance) => Mapper::Within(other(tolerance).unwrap_or(tolerance)),
@@ -385,45 +388,45 @@ pub(crate) struct Noted {
 }
 
 impl Noted {
-    /// All zeros, so that an empty log needs no room in the kernel's image.
+    /// An unused entry. It is all zeros, so that an empty log occupies no space in the kernel's image.
     const NONE: Self = Self {
         tick: 0,
         change: Change::Act(Action::YawLeft),
     };
 }
 
-/// Room for a log's changes.
+/// Memory for a log's changes.
 pub(crate) type Notes = [Noted; Log::MAX];
 
-/// What was changed, and when, since a state that is known.
+/// A log: a known state, and the changes since, with their ticks.
 #[derive(Debug)]
 pub(crate) struct Log<'a> {
-    /// What it started with.
+    /// The state before the first change.
     start: State<'a>,
     notes: &'a mut Notes,
     len: usize,
-    /// Changes that were made and not noted.
+    /// Changes that were made and did not fit in the log.
     lost: u32,
 }
 
-/// Why a change is not noted.
+/// Why a change is not logged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum NotNoted {
-    /// Its tick is before the last one's, which is this.
+    /// Its tick is before the tick of the last change, which is this.
     Before(u32),
-    /// There is no more room.
+    /// The log is full.
     Full,
 }
 
 impl<'a> Log<'a> {
-    /// Most changes. What is pushed to its limit is noted no more, so that is some hundred a minute of
-    /// someone who never stops playing.
+    /// Most changes. A push at its limit changes nothing and is not logged, so even a person who never stops
+    /// pressing keys adds only some hundred a minute.
     pub const MAX: usize = 1024;
 
-    /// Room, all zeros.
+    /// Memory for an empty log, all zeros.
     pub const NOTES: Notes = [Noted::NONE; Self::MAX];
 
-    /// Nothing changed since `start`.
+    /// Returns a log without changes since `start`.
     pub fn new(start: State<'a>, notes: &'a mut Notes) -> Self {
         let (len, lost) = (0, 0);
         Self {
@@ -434,32 +437,32 @@ impl<'a> Log<'a> {
         }
     }
 
-    /// Starts anew.
+    /// Discards all changes and starts again with `start`.
     pub fn restart(&mut self, start: State<'a>) {
         (self.start, self.len, self.lost) = (start, 0, 0);
     }
 
-    /// What it started with.
+    /// Returns the state before the first change.
     pub fn start(&mut self) -> &mut State<'a> {
         &mut self.start
     }
 
-    /// The changes with their ticks, which never go back.
+    /// Returns the changes with their ticks, which never decrease.
     pub fn changes(&self) -> impl Iterator<Item = (u32, &Change)> {
         self.notes[..self.len]
             .iter()
             .map(|noted| (noted.tick, &noted.change))
     }
 
-    /// How many changes were made and not noted.
+    /// Returns how many changes were made and did not fit in the log.
     pub fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// Notes a change.
+    /// Logs a change.
     ///
     /// # Errors
-    /// A tick before the last one's, and a log that is full.
+    /// The tick is before that of the last change, or the log is full.
     pub fn note(&mut self, tick: u32, change: Change) -> Result<(), NotNoted> {
         let last = self.changes().last().map(|(tick, _)| tick);
         if let Some(last) = last.filter(|&last| tick < last) {
@@ -471,21 +474,22 @@ impl<'a> Log<'a> {
         Ok(())
     }
 
-    /// Notes a change that was made. If that can't be it is counted: ticks go around after 828 days.
+    /// Logs a change that was made, or counts it as lost if that fails. It also fails when the tick counter
+    /// wraps, after 828 days.
     pub fn keep(&mut self, tick: u32, change: Change) {
         if self.note(tick, change).is_err() {
             self.lost = self.lost.saturating_add(1);
         }
     }
 
-    /// What the state was at a tick. Nothing if changes are missing that came before it.
+    /// Returns the state at a tick, or `None` if earlier changes were lost.
     pub fn state(&self, tick: u32) -> Option<State<'a>> {
         let mut state = self.start;
         for (noted, change) in self.changes() {
             if tick < noted {
                 return Some(state);
             }
-            // A name that nothing has was never noted.
+            // A change with an unknown name is never logged.
             let _ = state.change(noted, change);
         }
         (self.lost == 0).then_some(state)
@@ -502,7 +506,7 @@ mod tests {
     use std::vec::Vec;
     use texmap::Texture;
 
-    /// A catalogue's scene, as it moves by itself.
+    /// Returns the state of a catalogue's scene with its own motion.
     fn own(number: usize) -> State<'static> {
         State::of(Scenes::new(None), CATALOGUE[number])
     }
@@ -525,7 +529,7 @@ mod tests {
         }
     }
 
-    /// Taking up what has come together, at any tick, changes no pose after it.
+    /// Moving the starting point to any tick changes no later pose.
     #[test]
     fn a_pose_does_not_depend_on_when_it_was_looked_at() {
         let mut random = seeded::generator();
@@ -576,7 +580,7 @@ mod tests {
         }
     }
 
-    /// Where the nearest point of the ball goes, and its top.
+    /// Checks where the nearest point of the ball moves, and for a roll its top.
     #[test]
     fn each_turn_goes_the_way_of_its_name() {
         const UNIT: i32 = 1 << 16;
@@ -629,7 +633,7 @@ mod tests {
         for _ in 0..8 {
             act(&mut state, 0, Action::Slower);
         }
-        // An odd number of ticks at half the speed: between two of the scene's own.
+        // An odd number of ticks at half the speed: halfway between two of the scene's own poses.
         let slow = state.pose(801).yaw.wrapping_sub(state.pose(800).yaw) as i32;
         assert!((slow - normal / 80 / 2).abs() < 4, "{slow}");
         act(&mut state, 900, Action::Stop);
@@ -645,8 +649,8 @@ mod tests {
         );
     }
 
-    /// At any speed a walk along tiles goes on where they begin again: no pose between two of its
-    /// own is one that lies back, and no two in a row are a tile apart.
+    /// At any speed, the motion along tiles continues smoothly where the tiles repeat: no interpolated pose
+    /// lies behind its neighbours, and no two consecutive poses are a tile apart.
     #[test]
     fn a_walk_has_no_leap_at_a_tile_s_end() {
         let mut state = own(0);
@@ -709,12 +713,12 @@ mod tests {
             names.push(std::format!("{}", state.mapper));
         }
         assert_eq!(names, ["within-1/65536", "within-256"]);
-        // It is not in the list, and has its neighbours all the same.
+        // A tolerance that is not in the list still has neighbours.
         act(&mut state, 0, Action::NextMapper);
         assert_eq!(state.mapper.name(), "within-1/2");
     }
 
-    /// A model that was loaded is the scene to begin with, and has its place behind the others.
+    /// A loaded model is the first scene, and the last one in the list.
     #[test]
     fn a_model_is_a_scene_among_the_others() {
         let mesh = Mesh {

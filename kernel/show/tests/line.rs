@@ -1,4 +1,4 @@
-//! What the serial line does to a show, and what commands do to the card.
+//! Effects of the serial line on a demo, and of commands on the card.
 
 mod asked;
 
@@ -9,7 +9,7 @@ use modex::registers::MISC_WRITE;
 use show::Show;
 use vga::Vga;
 
-/// Times that the card's mode was set.
+/// Returns how often the card's mode was set.
 fn mode_sets(show: &mut Show<'_, Vga>) -> u64 {
     show.bus().port_writes(Purpose::Setup, MISC_WRITE, None)
 }
@@ -49,7 +49,7 @@ fn a_line_with_a_lost_byte_is_not_carried_out() {
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     done(&mut show, "hold", 0);
     let mut said = Vec::new();
-    // What arrives reads as a command.
+    // The bytes that arrive look like a command.
     for &byte in b"scene cu" {
         show.receive(byte, 0, &mut |line| said.push(line.to_string()));
     }

@@ -1,5 +1,5 @@
-//! What a dump's header says, after any sequence of commands: the header is enough to draw the bytes
-//! again, and after `hold` nothing depends on what was before.
+//! Properties of dump headers after any sequence of commands: the header is enough to draw the dump again,
+//! and after `hold` nothing depends on earlier commands.
 
 mod asked;
 
@@ -11,7 +11,7 @@ use show::Show;
 use texmap::{Mapper, Order};
 use vga::Vga;
 
-/// Commands of a sequence, and how many of them the twin repeats after `hold`.
+/// Commands in a sequence.
 const COMMANDS: usize = 60;
 const REPEATED: u32 = 5;
 
@@ -19,7 +19,7 @@ fn choice<T: Copy>(random: &mut Rng, all: &[T]) -> T {
     all[random.usize(..all.len())]
 }
 
-/// `scene`, `mapper` or `order`, and a name.
+/// Returns `scene`, `mapper` or `order`, and a name.
 fn setting(random: &mut Rng) -> String {
     match random.u8(..4) {
         0 => {
@@ -27,13 +27,13 @@ fn setting(random: &mut Rng) -> String {
             format!("scene {}", scene.name)
         }
         1 => format!("order {}", choice(random, &Order::ALL).0),
-        // Those that reduced quality makes a difference to are named more often.
+        // Mappers that reduced quality affects are chosen more often.
         2 => format!("mapper {}", choice(random, &["exact", "within-1/4"])),
         _ => format!("mapper {}", choice(random, Mapper::ALL).0),
     }
 }
 
-/// Four hex numbers, each below 2^`bits` in absolute value, but for the last.
+/// Returns four hex numbers: three below 2^`bits` in absolute value, and `distance`.
 fn turn(random: &mut Rng, bits: u32, distance: u32) -> String {
     let mut part = || {
         let value = random.u32(..1 << bits);
@@ -51,7 +51,7 @@ fn turn(random: &mut Rng, bits: u32, distance: u32) -> String {
     )
 }
 
-/// A command for a show that is held, or was.
+/// Returns a command for a held demo.
 fn held(random: &mut Rng, tick: &mut u32) -> String {
     match random.u8(..6) {
         0 | 1 => setting(random),
@@ -76,7 +76,7 @@ fn held(random: &mut Rng, tick: &mut u32) -> String {
     }
 }
 
-/// A command for a show that runs, or any other.
+/// Returns a command for a running demo, or any other command.
 fn any(random: &mut Rng, tick: &mut u32) -> String {
     match random.u8(..12) {
         0 => "run".into(),
@@ -91,14 +91,14 @@ fn any(random: &mut Rng, tick: &mut u32) -> String {
     }
 }
 
-/// A dump's lines without what names the page and without the checksum over it.
+/// Returns a dump's lines, without those that depend on the page or are a checksum over the dump.
 fn dump(show: &mut Show<'_, Vga>, what: &str) -> Vec<String> {
     let mut dump = done(show, what, 0);
     dump.retain(|line| !line.starts_with("start ") && !line.starts_with("end "));
     dump
 }
 
-/// Draws again what a dump's header names.
+/// Draws the frame that a dump's header names.
 fn draw_again(show: &mut Show<'_, Vga>, header: &[String]) {
     let line = |name: &str| {
         let mut lines = header.iter();
@@ -120,7 +120,7 @@ fn draw_again(show: &mut Show<'_, Vga>, header: &[String]) {
     }
 }
 
-/// All that a show says of itself: its memory, header, state, counts and log.
+/// Returns everything observable of a demo: checksums of its memory, header, state, counts, log and settings.
 fn all(show: &mut Show<'_, Vga>) -> Vec<String> {
     let mut all = done(show, "checksums all", 0);
     all.extend(done(show, "dump", 0).drain(..9));
@@ -131,7 +131,7 @@ fn all(show: &mut Show<'_, Vga>) -> Vec<String> {
     all
 }
 
-/// After each of some random commands the dump's header draws the dump again.
+/// After each of some random commands, the header of a dump is enough to draw the dump again.
 #[test]
 fn a_header_is_enough_to_draw_the_dump_again() {
     let mut random = seeded::generator();
@@ -151,7 +151,7 @@ fn a_header_is_enough_to_draw_the_dump_again() {
             show.present(tick, &mut |_| {});
             said.push(format!("(tick {tick})"));
         }
-        // What is written over the pictures of a running show has no name.
+        // Frames under an overlay have no name, so they are not compared.
         overlaid = running
             && (overlaid
                 || Action::ALL.iter().any(|(name, action)| {
@@ -172,7 +172,7 @@ fn a_header_is_enough_to_draw_the_dump_again() {
     }
 }
 
-/// A show that is held again is as a show that was just begun, whatever is asked of it then.
+/// A demo after `hold` is in the same state as a new demo, for any commands that follow.
 #[test]
 fn after_hold_nothing_depends_on_what_was_before() {
     let mut random = seeded::generator();

@@ -1,4 +1,4 @@
-//! How much stack the program takes on the host.
+//! The demo's need for stack on the host.
 
 mod asked;
 
@@ -8,10 +8,10 @@ use asked::done;
 use show::Show;
 use vga::Vga;
 
-/// A quarter of what a thread has by default.
+/// A quarter of a thread's default stack.
 const STACK: usize = 512 << 10;
 
-/// The program's memory is built in place, so a thread's stack is enough for all that the program does.
+/// The demo's memory is built in place, so a small stack is enough for everything that the demo does.
 #[test]
 fn a_small_stack_is_enough() {
     let work = || {

@@ -1,4 +1,4 @@
-//! A running show on the emulated card, steered by keys and commands, and drawn again from its log.
+//! A running demo on the emulated VGA, steered by keys and commands, and drawn again from its log.
 
 mod asked;
 
@@ -7,10 +7,10 @@ use link::Action;
 use show::{KEYS, Show};
 use vga::Vga;
 
-/// What is shown: the bytes' checksums, and what they are the picture of.
+/// Returns what is shown: checksums of the bytes, and the frame's name.
 fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {
     let mut evidence = done(show, "checksums", tick);
-    // The same picture may be on another page.
+    // The same frame may be on another page.
     let (_, crc) = evidence[0].split_once(" crc ").unwrap();
     evidence[0] = crc.to_string();
     let state = done(show, "state", tick);
@@ -22,7 +22,7 @@ fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {
     evidence
 }
 
-/// Codes of some keys: the keyboard's own table knows the others.
+/// Scan codes of the keys that these tests press.
 const M: u8 = 0x32;
 const LEFT: [u8; 2] = [0xE0, 0x4B];
 const PAGE_UP: [u8; 2] = [0xE0, 0x49];
@@ -36,7 +36,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
     let (mut tick, mut seen) = (random.u32(..1000), Vec::new());
     for picture in 0..seeded::cases(80) {
         show.present(tick, &mut |_| {});
-        // A picture that is written over is another one; those after it are as they were.
+        // Frames with an overlay differ; the frames after them must not.
         if picture / 10 % 2 == 0 {
             seen.push((tick, evidence(&mut show, tick)));
         }
@@ -44,11 +44,11 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
             let overlay = if picture < 40 { "help" } else { "info" };
             done(&mut show, &format!("steer {overlay}"), tick);
         }
-        // Some come after the picture of their tick, some before that of theirs.
+        // Some changes come after the frame of their tick, and some before it.
         for _ in 0..random.usize(..4) {
             let (_, action) = Action::ALL[random.usize(..Action::ALL.len())];
             match random.u8(..8) {
-                // What was before is not in the log then.
+                // A reset removes earlier changes from the log.
                 _ if action == Action::Reset || action.is_overlay() => {}
                 0 => LEFT
                     .iter()
@@ -75,14 +75,14 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
             done(show, line, 0);
         }
         assert_eq!(done(show, "log", 0), log);
-        // In any order.
+        // Any order gives the same frames.
         for _ in 0..seeded::cases(30) {
             let (tick, shown) = &seen[random.usize(..seen.len())];
             done(show, &format!("show at {tick}"), 0);
             assert_eq!(&evidence(show, 0), shown, "at {tick}");
         }
     }
-    // A picture's name is enough to draw it, its motion included.
+    // A frame's name, including its motion, is enough to draw the frame.
     for (tick, shown) in &seen {
         done(&mut show, &format!("show at {tick}"), 0);
         let [_, _, scene, mapper, picture, motion, _] = &shown[..] else {
@@ -114,7 +114,7 @@ fn a_running_show_can_be_stopped_at_a_tick_of_its_own() {
         done(&mut show, "log", 13)[3..],
         ["steer 11 nearer", "steer 13 next-mapper"]
     );
-    // What runs again runs by itself, as it was last drawn.
+    // A demo that runs again has the scene's own motion, and the settings of the last frame.
     done(&mut show, "run", 20);
     show.present(20, &mut |_| {});
     assert_eq!(
@@ -151,7 +151,7 @@ fn what_cannot_be_steered_is_told() {
     refused(&mut show, "steer 5 scene none", "no scene 'none'");
     done(&mut show, "steer 5 stop", 3);
     refused(&mut show, "steer 4 stop", "the last one is 5");
-    // A held show has no use for keys.
+    // A held demo ignores keys.
     show.key(M, 3);
     assert_eq!(done(&mut show, "log", 3)[3..], ["steer 5 stop"]);
     for tick in 6..6 + 1023 {
@@ -160,7 +160,7 @@ fn what_cannot_be_steered_is_told() {
     refused(&mut show, "steer 9999 stop", "it holds 1024 changes");
 }
 
-/// Actions act on when the log is full; a reset begins it anew.
+/// Actions still work when the log is full; a reset empties the log.
 #[test]
 fn a_full_log_is_told_and_steers_on() {
     let mut memory = asked::memory();
@@ -221,7 +221,7 @@ fn keys_are_listed_with_what_they_do() {
     );
 }
 
-/// What is written costs four writes to Map Mask, and none when it is drawn into RAM first.
+/// The overlay needs four writes to Map Mask, and none if the frame is drawn in RAM first.
 #[test]
 fn an_overlay_is_counted_apart_and_goes_again() {
     let mut memory = asked::memory();
@@ -242,7 +242,7 @@ fn an_overlay_is_counted_apart_and_goes_again() {
         (draw, overlay)
     };
     const NONE: &str = "ports 0 map-mask 0 stores 0 bytes 0";
-    // Until the pages have been drawn on, they are erased whole.
+    // A page that was not drawn on before is erased whole.
     for _ in 0..3 {
         present(&mut show);
     }
@@ -256,7 +256,7 @@ fn an_overlay_is_counted_apart_and_goes_again() {
                 overlay.starts_with("ports 4 map-mask 4 stores "),
                 "{name}: {overlay}"
             );
-            // A tick further the ball has some pixels and columns more or less.
+            // A tick later the ball has a few more or fewer pixels and columns.
             let columns = |text: &str| text.split(' ').nth(1).unwrap().parse::<i32>().unwrap();
             assert!(
                 (columns(&draw) - columns(&bare)).abs() < 100,
@@ -275,13 +275,13 @@ fn an_overlay_is_counted_apart_and_goes_again() {
             assert_eq!(present(&mut show).1, NONE, "{name}");
         }
     }
-    // The hint goes by itself, 300 ticks after it was asked for.
+    // The hint ends 300 ticks after its action.
     let gone = (0..400).find(|_| present(&mut show).1 == NONE).unwrap();
     assert!((250..300).contains(&gone), "{gone}");
 }
 
-/// Each window has what the whole picture has there, in every order; the error of the exact mapper is
-/// the same everywhere, and no other mapper's is.
+/// Each window has the pixels that the whole frame has there, in every order. The error of the exact mapper
+/// is the same everywhere; the errors of other mappers are not.
 #[test]
 fn a_split_view_shows_the_same_part_three_times() {
     const LINES: usize = 200;
@@ -327,7 +327,7 @@ fn a_split_view_shows_the_same_part_three_times() {
                 .iter()
                 .filter(|colour| !whole.contains(colour))
                 .count();
-            // The board leans so that other mappers are off by next to nothing, too.
+            // The board is slanted so that the errors of the other mappers are nearly zero too.
             match mapper {
                 "exact" => assert_eq!(same, 1, "{order}: {errors:?}"),
                 "shifts" | "row-multiply" => assert!(same > 4, "{mapper} {order}: {errors:?}"),
@@ -343,7 +343,7 @@ fn a_split_view_shows_the_same_part_three_times() {
     }
 }
 
-/// Lower while it moves, and as it was when it stands; in the log's pictures as in the show's own.
+/// Quality is reduced during motion only, in the log's frames as in the demo's own.
 #[test]
 fn quality_is_lower_while_it_moves_and_only_then() {
     let mut memory = asked::memory();
@@ -385,7 +385,7 @@ fn quality_is_lower_while_it_moves_and_only_then() {
         done(&mut show, &format!("show at {tick}"), 0);
         assert_eq!(&evidence(&mut show, 0), shown, "at {tick}");
     }
-    // A picture by its name is in full quality, unless the name has a motion.
+    // A frame by its name has full quality, unless the name includes a motion.
     done(&mut show, "mapper exact", 0);
     done(&mut show, "show 101", 0);
     let named = evidence(&mut show, 0);
@@ -393,7 +393,7 @@ fn quality_is_lower_while_it_moves_and_only_then() {
     assert_ne!(named[0], moving[0]);
     done(&mut show, &format!("show 101 {by}"), 0);
     assert_eq!(evidence(&mut show, 0), moving);
-    // A motion that reduces nothing is no part of the name.
+    // A motion that reduces no face's quality is not part of the name.
     let still = format!("show 101 motion{}", " 00000000".repeat(4));
     for name in [still.as_str(), "mapper shifts"] {
         done(&mut show, name, 0);

@@ -1,8 +1,8 @@
-//! A whole session as text: every kind of command, and frames of the running show by their checksums.
+//! A whole session as text: every kind of command, and frames of the running demo by their checksums.
 //!
-//! `transcript.txt` is what a person at the serial line would see, without the checksums of lines. Each
-//! line is cheap to read and hard to get wrong, so this one test notices a change in any answer, in the
-//! overlay and in the split view. After a change that is meant, look at the difference, and run
+//! `transcript.txt` is what a person at the serial line would see, without the checksums of lines. Each line
+//! is easy to read, and a change in any answer, in the overlay or in the split view changes the transcript.
+//! After an intended change, look at the difference, and run
 //! `UPDATE_EXPECT=1 cargo test -p show --test transcript`.
 
 mod asked;
@@ -15,8 +15,9 @@ use link::Reception;
 use show::Show;
 use vga::Vga;
 
-/// What happens in the session. `tick N` shows the running show's frame of a tick, if that is due;
-/// `took N` says how many microseconds it took; `key` sends scan codes; everything else is a command.
+/// The session's steps. `tick N` shows the running demo's frame of a tick, if it is due; `took N` sets how
+/// many microseconds the frame needed; `key` sends scan codes; `lose` sets losses of the keyboard and the
+/// serial line; `#` begins a comment; everything else is a command.
 const SESSION: &str = include_str!("session.txt");
 
 #[test]

@@ -1,24 +1,23 @@
-//! The time stamp counter.
+//! The time stamp counter, and times measured with it.
 
 use core::arch::asm;
 use core::arch::x86_64::{__cpuid, __cpuid_count};
 
 use link::TICKS_PER_SECOND;
 
-/// Ticks since the machine's start: the host's own under plain TCG, instructions carried out under
-/// `-icount shift=0`. The compiler moves no memory access across it.
+/// Returns the time stamp counter: the host's counter under plain TCG, and the number of instructions carried
+/// out under `-icount shift=0`. The compiler moves no memory access across the call.
 pub fn now() -> u64 {
     let (low, high): (u32, u32);
-    // SAFETY: RDTSC changes two registers, and nothing forbids it to the kernel. That memory is not
-    // said to be untouched is what keeps accesses in their place.
+    // SAFETY: RDTSC changes two registers, and nothing forbids it to the kernel. Without `nomem` the compiler
+    // must assume that it accesses memory, which keeps other accesses in their place.
     unsafe {
         asm!("rdtsc", out("eax") low, out("edx") high, options(nostack, preserves_flags));
     }
     u64::from(high) << 32 | u64::from(low)
 }
 
-/// Tells how long something took: by the time stamp counter, and by the ticks that have passed, which
-/// say how fast that counts.
+/// Measures time by the time stamp counter, and finds the counter's rate from the ticks that have passed.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     began: u64,
@@ -26,13 +25,13 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Begins to compare the two.
+    /// Begins to compare counter and ticks.
     pub fn start(tick: u32) -> Self {
         Self { began: now(), tick }
     }
 
-    /// The microseconds since the counter was at `since`. The longer ago the start, the more exact:
-    /// after a second within 2 %.
+    /// Returns the microseconds since the counter was at `since`. The result is more exact the longer ago the
+    /// start is: within 2 % after a second.
     pub fn micros(&self, since: u64, tick: u32) -> u32 {
         let now = now();
         let ticks = tick.wrapping_sub(self.tick);
@@ -43,10 +42,10 @@ impl Stopwatch {
     }
 }
 
-/// Carries out `count` instructions in a loop of two, and the same few around it for every count.
+/// Carries out `count` instructions in a loop of two, plus the same few around the loop for every count.
 #[inline(never)]
 pub fn instructions(count: u32) {
-    // SAFETY: it counts a register of its own down to zero.
+    // SAFETY: the loop only counts its operand register down to zero.
     unsafe {
         asm!(
             "2:",
@@ -58,7 +57,7 @@ pub fn instructions(count: u32) {
     }
 }
 
-/// Whether the CPU has BMI2, with the bit-extract instruction.
+/// Returns whether the CPU has BMI2, which includes the bit-extract instruction.
 pub fn has_bmi2() -> bool {
     const EXTENDED_FEATURES: u32 = 7;
     const BMI2: u32 = 1 << 8;

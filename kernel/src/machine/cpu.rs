@@ -1,9 +1,9 @@
 //! Descriptor tables, exceptions and interrupts.
 //!
-//! Handlers are naked stubs that save every general register before Rust code runs: an exception
-//! is reported with the registers as they were. (The `x86-interrupt` ABI needs a nightly
-//! compiler and never shows them.) Page faults and double faults run on stacks of their own: the
-//! usual cause of either is that the kernel's stack is used up.
+//! Handlers are naked stubs that save every general register before Rust code runs, so that an exception is
+//! reported with the registers as they were. (The `x86-interrupt` ABI needs a nightly compiler and never
+//! shows the registers.) Page faults and double faults each run on a separate stack: the usual cause of
+//! either is that the kernel's stack is used up.
 
 use core::arch::naked_asm;
 use core::cell::UnsafeCell;
@@ -22,12 +22,12 @@ use x86_64::structures::tss::TaskStateSegment;
 use super::frame::Frame;
 use super::{keyboard, report, serial, timer};
 
-/// Vector of IRQ 0; the ones below are the CPU's exceptions.
+/// Vector of IRQ 0. The vectors below it are the CPU's exceptions.
 const IRQ_BASE: u8 = 32;
 const IRQ_TIMER: u8 = IRQ_BASE;
 const IRQ_KEYBOARD: u8 = IRQ_BASE + 1;
 const IRQ_SERIAL: u8 = IRQ_BASE + 4;
-/// IRQ 7 arrives unasked when a request goes away before it is taken.
+/// IRQ 7 also arrives spuriously, when a request ends before the CPU acknowledges it.
 const IRQ_SPURIOUS: u8 = IRQ_BASE + 7;
 /// Interrupt lines that stay masked: all but the timer's, the keyboard's and COM1's.
 const MASK: [u8; 2] = [!0b0001_0011, 0xFF];
@@ -38,7 +38,7 @@ const DOUBLE_FAULT_STACK: u16 = 1;
 const STACK_BYTES: usize = 16 * 1024;
 const PAGE_BYTES: u64 = 4096;
 
-/// A stack that the CPU switches to. Only the CPU writes it: Rust code takes its address.
+/// A stack that the CPU switches to. Only the CPU writes it; Rust code only uses its address.
 #[repr(align(16))]
 struct Stack(UnsafeCell<[u8; STACK_BYTES]>);
 
@@ -47,10 +47,10 @@ unsafe impl Sync for Stack {}
 
 static STACKS: [Stack; 2] = [const { Stack(UnsafeCell::new([0; STACK_BYTES])) }; 2];
 
-// SAFETY: the vectors they move to are the ones that have handlers here.
+// SAFETY: the PICs are moved to vectors that have handlers in this file.
 static PICS: Mutex<ChainedPics> = Mutex::new(unsafe { ChainedPics::new(IRQ_BASE, IRQ_BASE + 8) });
 
-/// Lowest address of the kernel's stack; the page below it is not mapped.
+/// Lowest address of the kernel's stack. The page below it is not mapped.
 static STACK_BOTTOM: AtomicU64 = AtomicU64::new(0);
 
 static TSS: LazyLock<TaskStateSegment> = LazyLock::new(|| {
@@ -88,32 +88,30 @@ static GDT: LazyLock<Segments> = LazyLock::new(|| {
 
 static IDT: LazyLock<InterruptDescriptorTable> = LazyLock::new(interrupt_table);
 
-/// Loads the tables and lets the interrupts of timer, keyboard and COM1 through.
+/// Loads the tables and unmasks the interrupts of timer, keyboard and COM1.
 pub fn init(stack_bottom: u64) {
     STACK_BOTTOM.store(stack_bottom, Ordering::Relaxed);
     GDT.table.load();
-    // SAFETY: the selectors are those of the table just loaded.
+    // SAFETY: the selector is from the table just loaded.
     unsafe { CS::set_reg(GDT.code) };
     for set in [SS::set_reg, DS::set_reg, ES::set_reg] {
-        // SAFETY: as above. An old selector left in SS would be looked up in the new table at
-        // the next IRET.
+        // SAFETY: as above. The next IRET would look up an old selector left in SS in the new table.
         unsafe { set(GDT.data) };
     }
     // SAFETY: as above, and the segment is a static.
     unsafe { load_tss(GDT.tss) };
     IDT.load();
     let mut pics = PICS.lock();
-    // SAFETY: all vectors they use have handlers in the table just loaded.
+    // SAFETY: all vectors that the PICs use have handlers in the table just loaded.
     unsafe { pics.initialize() };
-    // SAFETY: masking only holds interrupts back.
+    // SAFETY: a mask only holds interrupts back.
     unsafe { pics.write_masks(MASK[0], MASK[1]) };
 }
 
-/// The stub of vector `VECTOR`, which comes without an error code if `CODE` is 0: a zero takes
+/// The stub of vector `VECTOR`. If `CODE` is 0, the vector has no error code, and the stub pushes a zero in
 /// its place.
 ///
-/// Every stub hands over to [`save_and_dispatch`]; for an interrupt that returns, which is why
-/// the registers are restored there.
+/// Every stub jumps to [`save_and_dispatch`], which restores the registers because interrupts return.
 #[unsafe(naked)]
 extern "C" fn stub<const VECTOR: u8, const CODE: u8>() {
     naked_asm!(
@@ -150,7 +148,7 @@ extern "C" fn save_and_dispatch() {
         "push rax",
         "mov rdi, rsp",
         "cld",
-        // The CPU aligned the stack to 16 before it pushed; 23 words lie on it now.
+        // The CPU aligned the stack to 16 bytes before it pushed; 23 words are on it now.
         "sub rsp, 8",
         "call {dispatch}",
         "add rsp, 16",
@@ -231,13 +229,13 @@ fn name(frame: &Frame) -> &'static str {
 
 fn interrupt_table() -> InterruptDescriptorTable {
     let mut idt = InterruptDescriptorTable::new();
-    /// Address of a stub, as the table wants it.
+    /// Address of a stub, in the type of the table.
     macro_rules! stub {
         ($vector:expr, $code:expr) => {
             VirtAddr::from_ptr(stub::<{ $vector }, { $code }> as *const ())
         };
     }
-    /// Sets the handlers that need no stack of their own.
+    /// Sets the handlers that need no separate stack.
     macro_rules! set {
         ($($entry:expr => $vector:expr, $code:expr;)*) => {$(
             // SAFETY: the stub saves and restores every register and matches its error code.
@@ -268,33 +266,33 @@ fn interrupt_table() -> InterruptDescriptorTable {
         idt[IRQ_SERIAL] => IRQ_SERIAL, 0;
         idt[IRQ_SPURIOUS] => IRQ_SPURIOUS, 0;
     }
-    // SAFETY: as for the others.
+    // SAFETY: as for the handlers above.
     let double_fault = unsafe { idt.double_fault.set_handler_addr(stub!(8, 1)) };
-    // SAFETY: the stack is the double fault's alone.
+    // SAFETY: only the double fault uses this stack.
     unsafe { double_fault.set_stack_index(DOUBLE_FAULT_STACK) };
-    // SAFETY: as for the others.
+    // SAFETY: as for the handlers above.
     let page_fault = unsafe { idt.page_fault.set_handler_addr(stub!(14, 1)) };
-    // SAFETY: the stack is the page fault's alone.
+    // SAFETY: only the page fault uses this stack.
     unsafe { page_fault.set_stack_index(PAGE_FAULT_STACK) };
     idt
 }
 
-/// Reads where nothing is mapped.
+/// Causes a page fault by a read from an address that is not mapped.
 pub fn page_fault() -> ! {
-    // The boot loader maps nothing into the first page, so that null pointers are noticed. The
-    // address is not 0, which the compiler may treat as impossible.
+    // The boot loader maps nothing into the first page, so that null pointers fault. The address is not 0,
+    // because the compiler may assume that no access to 0 happens.
     let nowhere = core::ptr::without_provenance::<u8>(0x40);
-    // SAFETY: none: the read faults, and that is what it is for.
+    // SAFETY: none. The read faults, which is its purpose.
     let read = unsafe { nowhere.read_volatile() };
     panic!("address {nowhere:p} was readable ({read:02x})")
 }
 
-/// Calls itself until the stack is used up.
+/// Overflows the stack by endless recursion.
 pub fn stack_overflow() -> ! {
     #[inline(never)]
     fn deeper(depth: u64) -> u64 {
         let page = core::hint::black_box([depth; 64]);
-        // Something is left to do after the call: no loop can be made of it.
+        // Work remains after the call, so the compiler cannot turn the recursion into a loop.
         if depth == u64::MAX {
             0
         } else {
@@ -304,13 +302,13 @@ pub fn stack_overflow() -> ! {
     panic!("the stack held {} calls", deeper(0))
 }
 
-/// Takes an exception with no table of handlers: the CPU resets.
+/// Raises an exception without a table of handlers, so that the CPU resets.
 pub fn triple_fault() -> ! {
     let empty = DescriptorTablePointer {
         limit: 0,
         base: VirtAddr::new(0),
     };
-    // SAFETY: none: the next exception finds no handler, and that is what it is for.
+    // SAFETY: none. The next exception finds no handler, which is its purpose.
     unsafe { lidt(&empty) };
     x86_64::instructions::interrupts::int3();
     super::stop()

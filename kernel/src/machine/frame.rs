@@ -1,30 +1,30 @@
 //! The stack frame of an exception or interrupt.
 
-/// Everything the CPU and a stub put on the stack, from the lowest address up.
+/// The values that the CPU and a stub have pushed on the stack, from the lowest address up.
 #[derive(Debug)]
 #[repr(C)]
 pub struct Frame {
-    /// The address that a page fault is about.
+    /// The address that a page fault was caused by.
     pub cr2: u64,
     general: [u64; 15],
-    /// Which exception or interrupt.
+    /// The vector of the exception or interrupt.
     pub vector: u64,
     /// The CPU's error code, or 0 for an exception without one.
     pub error: u64,
-    /// Where it happened.
+    /// Instruction pointer at the exception or interrupt.
     pub rip: u64,
-    /// The code segment there.
+    /// Code segment there.
     pub cs: u64,
-    /// The flags there.
+    /// Flags there.
     pub rflags: u64,
-    /// The stack there.
+    /// Stack pointer there.
     pub rsp: u64,
-    /// The stack segment there.
+    /// Stack segment there.
     pub ss: u64,
 }
 
 impl Frame {
-    /// The general registers by name, in the order in which they are told.
+    /// Returns the general registers with their names, in the order of a report.
     pub fn general(&self) -> [(&'static str, u64); 15] {
         let [
             r15,

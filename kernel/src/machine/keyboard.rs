@@ -1,28 +1,27 @@
-//! The keyboard: scancodes from the PS/2 controller (8042), by interrupt.
+//! The keyboard: scan codes from the PS/2 controller (8042), by interrupt.
 //!
-//! The controller is asked for little, since firmware has set it up for an operating system to take
-//! over, and a USB keyboard may stand behind it by the firmware's doing: its configuration byte is
-//! read and written back with keyboard, interrupt and translation on, and the mouse off. So codes are
-//! of set 1 whatever the keyboard speaks. Left as they are: the keyboard's rate of repeats, its
-//! lights, and its own code set.
+//! The kernel changes little in the controller, because the firmware has set it up for an operating system,
+//! and may be emulating it for a USB keyboard. The kernel reads the configuration byte and writes it back
+//! with keyboard, interrupt and translation on, and the mouse off. So codes are in set 1, whatever the
+//! keyboard sends. The keyboard's repeat rate, lights and own code set stay as they are.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use super::ports;
 use crate::ring::Ring;
 
-/// Data: codes in, and the byte of a command out.
+/// Data port: reads codes, and writes the byte after a command.
 const DATA: u16 = 0x60;
-/// Status when read, commands when written.
+/// Status port when read, command port when written.
 const STATUS: u16 = 0x64;
 
-/// A byte is waiting in [`DATA`].
+/// Status: a byte is waiting in [`DATA`].
 const OUTPUT_FULL: u8 = 0x01;
-/// The controller has not taken the last byte yet.
+/// Status: the controller has not accepted the last byte yet.
 const INPUT_FULL: u8 = 0x02;
-/// The waiting byte is the mouse's.
+/// Status: the waiting byte is the mouse's.
 const FROM_MOUSE: u8 = 0x20;
-/// What a port with nothing behind it reads.
+/// The value that a port without a device reads.
 const NOTHING: u8 = 0xFF;
 
 const READ_CONFIGURATION: u8 = 0x20;
@@ -30,30 +29,30 @@ const WRITE_CONFIGURATION: u8 = 0x60;
 const DISABLE_MOUSE: u8 = 0xA7;
 const DISABLE_KEYBOARD: u8 = 0xAD;
 const ENABLE_KEYBOARD: u8 = 0xAE;
-/// Interrupt for the keyboard, and its codes translated to set 1.
+/// Configuration: interrupt for the keyboard, and translation of its codes to set 1.
 const ON: u8 = 0x41;
-/// Interrupt for the mouse.
+/// Configuration: interrupt for the mouse.
 const OFF: u8 = 0x02;
-/// The clocks of keyboard and mouse stopped.
+/// Configuration: stop the clocks of keyboard and mouse.
 const STOPPED: u8 = 0x30;
 
-/// Polls of a status bit before the controller is given up: it answers within some milliseconds, and
-/// a poll takes about a microsecond.
+/// Polls of a status bit before the controller is given up. The controller answers within some milliseconds,
+/// and a poll lasts about a microsecond.
 const POLLS: u32 = 100_000;
 
-/// Codes that wait for the program: what a keyboard sends in three seconds.
+/// Codes that can wait for the program: as many as a keyboard sends in three seconds.
 const RING: usize = 128;
 static CODES: Ring<RING> = Ring::new();
-/// Codes that found no room.
+/// Codes that were lost because the ring was full.
 static LOST: AtomicU32 = AtomicU32::new(0);
 
-/// Sets the controller up. A machine without one runs all the same, and no key does anything.
+/// Sets the controller up. A machine without a controller still runs; keys then have no effect.
 ///
-/// Both ports are off until the end: a byte that a device sends between the command and the
-/// controller's answer would be taken for the configuration byte.
+/// Both ports are off until the end, because a byte from a device between the command and the controller's
+/// answer would be read as the configuration byte.
 ///
-/// Called with interrupts off, the keyboard's not masked: a code that came before would keep the
-/// request up, and no other one would be seen.
+/// Called with interrupts off and the keyboard's interrupt not masked. A code that arrived earlier would keep
+/// the request up, and no later request would be seen.
 pub fn init() {
     if status() == NOTHING {
         return;
@@ -67,7 +66,7 @@ pub fn init() {
         let configuration = read() & !OFF | ON | STOPPED;
         command(WRITE_CONFIGURATION);
         if wait(|status| status & INPUT_FULL == 0) {
-            // SAFETY: the configuration byte, which the controller waits for.
+            // SAFETY: the controller is waiting for its configuration byte, which this is.
             unsafe { ports::out8(DATA, configuration) };
         }
     }
@@ -76,23 +75,23 @@ pub fn init() {
     drain();
 }
 
-/// The next code, if any.
+/// Returns the next code, if one is waiting.
 pub fn receive() -> Option<u8> {
     CODES.pop().map(|code| code as u8)
 }
 
-/// Whether a code is waiting.
+/// Returns whether a code is waiting.
 pub fn has_received() -> bool {
     !CODES.is_empty()
 }
 
-/// Codes that found no room.
+/// Returns how many codes were lost because the ring was full.
 pub fn lost() -> u32 {
     LOST.load(Ordering::Relaxed)
 }
 
-/// The interrupt handler's part: fetches what the controller has. All of it, since the request is an
-/// edge; and no more than the ring holds, should the port read nonsense.
+/// The interrupt handler's part: fetches what the controller has. It fetches everything, because the request
+/// is an edge, but no more than the ring holds, in case the port reads nonsense.
 pub(super) fn take() {
     for _ in 0..RING {
         let status = status();
@@ -112,18 +111,18 @@ fn status() -> u8 {
 }
 
 fn read() -> u8 {
-    // SAFETY: it takes a byte from the controller and touches no memory.
+    // SAFETY: the read removes a byte from the controller and touches no memory.
     unsafe { ports::in8(DATA) }
 }
 
 fn command(command: u8) {
     if wait(|status| status & INPUT_FULL == 0) {
-        // SAFETY: the commands above set the controller up; none resets the machine.
+        // SAFETY: the commands above set the controller up; none of them resets the machine.
         unsafe { ports::out8(STATUS, command) };
     }
 }
 
-/// Throws away what is waiting.
+/// Discards the waiting bytes.
 fn drain() {
     wait(|status| {
         let waiting = status & OUTPUT_FULL != 0;
@@ -134,7 +133,7 @@ fn drain() {
     });
 }
 
-/// Whether the status came to hold.
+/// Polls the status until `holds` accepts it. Returns false if that does not happen within [`POLLS`] polls.
 fn wait(mut holds: impl FnMut(u8) -> bool) -> bool {
     (0..POLLS).any(|_| holds(status()))
 }

@@ -1,12 +1,12 @@
 //! Port access.
 //!
-//! Not the `x86_64` crate's, on purpose: its instructions carry `options(nomem)`, which lets the
-//! compiler move memory accesses across an OUT and delete stores between two of them. To the VGA
-//! the order of the two is everything.
+//! The `x86_64` crate's port instructions are not used, on purpose: they have `options(nomem)`, which lets
+//! the compiler move memory accesses across an OUT and delete stores between two OUTs. The VGA depends on the
+//! order of port writes and memory accesses.
 
 use core::arch::asm;
 
-/// Writes a byte.
+/// Writes a byte to a port.
 ///
 /// # Safety
 /// The device at `port` must not break memory safety when it is written.
@@ -15,7 +15,7 @@ pub unsafe fn out8(port: u16, value: u8) {
     unsafe { asm!("out dx, al", in("dx") port, in("al") value, options(nostack, preserves_flags)) }
 }
 
-/// Writes a word.
+/// Writes a word to a port.
 ///
 /// # Safety
 /// As [`out8`].
@@ -24,7 +24,7 @@ pub unsafe fn out16(port: u16, value: u16) {
     unsafe { asm!("out dx, ax", in("dx") port, in("ax") value, options(nostack, preserves_flags)) }
 }
 
-/// Writes a double word.
+/// Writes a double word to a port.
 ///
 /// # Safety
 /// As [`out8`].
@@ -35,7 +35,7 @@ pub unsafe fn out32(port: u16, value: u32) {
     }
 }
 
-/// Reads a byte.
+/// Reads a byte from a port.
 ///
 /// # Safety
 /// The device at `port` must not break memory safety when it is read.
@@ -46,7 +46,7 @@ pub unsafe fn in8(port: u16) -> u8 {
     value
 }
 
-/// Reads a word.
+/// Reads a word from a port.
 ///
 /// # Safety
 /// As [`in8`].

@@ -1,4 +1,4 @@
-//! The last words: panics, CPU exceptions and an unfit display adapter, whole, on the serial line.
+//! Final reports on the serial line: panics, CPU exceptions and an unfit display adapter.
 
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +9,8 @@ use modex::SetError;
 use super::frame::Frame;
 use super::serial::Unlocked;
 
-/// A failure while one is being reported ends the machine at once: the first is the one to read.
+/// Whether a report has begun. A failure during a report ends the machine at once, so the first failure is
+/// the one that the host reads.
 static REPORTING: AtomicBool = AtomicBool::new(false);
 
 /// Reports a panic and ends the machine.
@@ -23,7 +24,7 @@ pub fn panic(info: &PanicInfo<'_>) -> ! {
     })
 }
 
-/// Reports that the display adapter does not take Mode X and ends the machine.
+/// Reports that the display adapter does not support Mode X, and ends the machine.
 pub fn adapter(error: SetError) -> ! {
     report(Exit::Adapter, |out| {
         out.line(format_args!("{ADAPTER} does not take Mode X: {error}"));

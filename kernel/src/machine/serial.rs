@@ -18,25 +18,25 @@ const INTERRUPT_ENABLE: u16 = COM1 + 1;
 const LINE_STATUS: u16 = COM1 + 5;
 const DATA_READY: u8 = 0x01;
 const TRANSMITTER_EMPTY: u8 = 0x20;
-/// Bytes that the transmitter takes at once.
+/// Bytes that the transmitter accepts at once.
 const FIFO: usize = 16;
 
-/// Bytes that wait for the program: what arrives in 0.35 s at 115 200 baud.
+/// Bytes that can wait for the program: as many as arrive in 0.35 s at 115 200 baud.
 const RING: usize = 4096;
 static RECEIVER: Receiver<RING> = Receiver::new();
 
-/// The port for sending, once it was found. The interrupt handler reaches the receiver's registers
-/// without the lock.
+/// The port for sending, if it was found. The interrupt handler accesses the receiver's registers without
+/// this lock.
 static SERIAL: Mutex<Option<Port>> = Mutex::new(None);
 
-/// COM1's registers.
+/// The sender's side of COM1.
 #[derive(Debug)]
 struct Port {
-    /// Bytes that the transmitter takes at once: 1 if the UART has no FIFO.
+    /// Bytes that the transmitter accepts at once: 1 if the UART has no FIFO.
     room: usize,
 }
 
-/// COM1's registers as the receiver needs them.
+/// The receiver's side of COM1.
 struct Com1;
 
 impl Uart for Com1 {
@@ -46,7 +46,7 @@ impl Uart for Com1 {
     }
 
     fn data(&mut self) -> u8 {
-        // SAFETY: reading COM1's data register takes a byte and touches no memory.
+        // SAFETY: reading COM1's data register removes a byte from the UART and touches no memory.
         unsafe { ports::in8(DATA) }
     }
 
@@ -57,18 +57,17 @@ impl Uart for Com1 {
     }
 }
 
-/// Finds and sets up the port. A machine without one runs all the same, and says nothing.
+/// Finds the port and sets it up. A machine without the port still runs, without output.
 ///
-/// Set: 115 200 baud, 8-N-1, FIFO on, no interrupt yet ([`listen`]). Left unset: everything about
-/// modem control.
+/// It sets 115 200 baud, 8-N-1 and FIFO on, with no interrupt yet ([`listen`]). It leaves modem control as it
+/// is.
 pub fn init() {
     let Some(mut uart) = port() else { return };
     let config = Config {
         baud_rate: BaudRate::Baud115200,
         interrupts: IER::empty(),
-        // The other half of the FIFO fills in 0.7 ms, more than twice what the keyboard's handler may
-        // take. What is left below the level comes with the FIFO's time-out, four characters
-        // (0.35 ms) later.
+        // The other half of the FIFO fills in 0.7 ms, more than twice what the keyboard's handler may need.
+        // Bytes below the trigger level arrive with the FIFO's time-out, four characters (0.35 ms) later.
         fifo_trigger_level: Some(FifoTriggerLevel::Eight),
         ..Config::DEFAULT
     };
@@ -78,8 +77,8 @@ pub fn init() {
     }
 }
 
-/// Has bytes received by interrupt from now on. The interrupt controller must be set up: it sees only
-/// the edge when a request begins, and bytes that wait already begin one here.
+/// Switches the interrupt for received bytes on. The interrupt controller must be set up: it sees only the
+/// edge at which a request begins, and bytes that are already waiting begin one here.
 pub fn listen() {
     if SERIAL.lock().is_some() {
         Com1.set_interrupt(true);
@@ -93,7 +92,7 @@ pub fn line(text: fmt::Arguments<'_>) {
     }
 }
 
-/// Cancels the line that something else may have begun.
+/// Cancels a line that other software may have begun.
 pub fn cancel_line() {
     if let Some(port) = &mut *SERIAL.lock() {
         port.send(&[CANCEL]);
@@ -101,7 +100,7 @@ pub fn cancel_line() {
 }
 
 impl Port {
-    /// Sends bytes, and waits for a host that does not read.
+    /// Sends bytes, and waits while the host does not read.
     fn send(&mut self, bytes: &[u8]) {
         for bytes in bytes.chunks(self.room) {
             while !super::undisturbed(|| RECEIVER.can_send(&mut Com1)) {
@@ -115,17 +114,17 @@ impl Port {
     }
 }
 
-/// The next byte that was received, if any.
+/// Returns the next received byte, if one is waiting.
 pub fn receive() -> Option<Received> {
     RECEIVER.fetch(&mut Com1)
 }
 
-/// Whether a byte is waiting.
+/// Returns whether a byte is waiting.
 pub fn has_received() -> bool {
     RECEIVER.has_received()
 }
 
-/// What went wrong on the way in, since the start.
+/// Returns the receiver's errors since the start.
 pub fn reception() -> Reception {
     Reception {
         overruns: RECEIVER.overruns(),
@@ -134,29 +133,29 @@ pub fn reception() -> Reception {
     }
 }
 
-/// The interrupt handler's part.
+/// The interrupt handler's part: moves received bytes into the ring.
 pub(super) fn take() {
     RECEIVER.take(&mut Com1);
 }
 
 fn port() -> Option<Uart16550<PioBackend>> {
-    // SAFETY: COM1's ports are a UART's, or nobody's, on every PC.
+    // SAFETY: on every PC, COM1's ports belong to a UART or to no device.
     unsafe { Uart16550::new_port(COM1) }.ok()
 }
 
-/// A writer for reports of a panic or an exception: it goes past the lock, which the code that
-/// failed may hold, and waits for the host no longer than `PATIENCE` in all.
+/// A writer for reports of a panic or an exception. It bypasses the lock, which the code that failed may
+/// hold, and waits for the host no longer than `PATIENCE` in all.
 #[derive(Debug)]
 pub struct Unlocked {
     clock: timer::Countdown,
 }
 
-/// Timer periods that a whole report may wait for its host: 5 s of ticks, and 16 s if the failure
-/// came before the timer was set.
+/// Timer periods that a whole report may wait for the host: 5 s of ticks, and 16 s if the failure came before
+/// the timer was set.
 const PATIENCE: u32 = 5 * TICKS_PER_SECOND;
 
 impl Unlocked {
-    /// Takes the port over; what the lock's holder had begun of a line is cancelled.
+    /// Takes over the port, and cancels a line that the lock's holder may have begun.
     pub fn take_over() -> Self {
         let mut this = Self {
             clock: timer::Countdown::new(PATIENCE),
@@ -170,7 +169,7 @@ impl Unlocked {
         link::write_line(text, |bytes| self.send(bytes));
     }
 
-    /// Waits until the host acknowledges; commands that were under way are thrown away.
+    /// Waits until the host acknowledges, and discards commands that were on their way.
     pub fn wait_for_host(&mut self) {
         while self.wait(DATA_READY) {
             if Com1.data() == ACKNOWLEDGE {
@@ -187,7 +186,7 @@ impl Unlocked {
         }
     }
 
-    /// Whether `status` came before patience was over.
+    /// Waits for `status`. Returns false if `PATIENCE` ran out first.
     fn wait(&mut self, status: u8) -> bool {
         loop {
             if Com1.line_status() & status != 0 {

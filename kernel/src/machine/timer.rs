@@ -1,6 +1,6 @@
-//! Ticks of [`TICKS_PER_SECOND`], from the programmable interval timer.
+//! Ticks, [`TICKS_PER_SECOND`] of them, from the programmable interval timer.
 //!
-//! The VGA's retrace can't pace anything here: QEMU toggles it at every read.
+//! The VGA's retrace cannot pace anything here: QEMU toggles it at every read.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -10,7 +10,7 @@ use super::ports;
 
 /// The timer's input clock in Hz (14.31818 MHz / 12).
 const CLOCK: u32 = 1_193_182;
-/// 60.0011 Hz.
+/// The divisor for 60.0011 Hz.
 const DIVISOR: u16 = (CLOCK / TICKS_PER_SECOND) as u16;
 
 const CHANNEL_0: u16 = 0x40;
@@ -34,12 +34,12 @@ pub fn start() {
     x86_64::instructions::interrupts::enable();
 }
 
-/// Ticks since the start; after 2^32 - 1 comes 0.
+/// Returns the ticks since the start; after 2^32 - 1 comes 0.
 pub fn ticks() -> u32 {
     TICKS.load(Ordering::Relaxed)
 }
 
-/// A wait that needs no interrupts: it watches the timer's counter begin anew.
+/// A time limit that needs no interrupts: it polls the timer's counter and counts how often it restarts.
 #[derive(Debug)]
 pub struct Countdown {
     periods: u32,
@@ -48,12 +48,12 @@ pub struct Countdown {
 }
 
 impl Countdown {
-    /// Reads of the counter after which a timer that does not count is given up.
+    /// Reads of the counter until a timer that does not count is given up.
     const READS: u32 = 50_000_000;
-    /// Latches channel 0's count.
+    /// Command that latches channel 0's count.
     const LATCH: u8 = 0x00;
 
-    /// Over when the timer has begun anew `periods` times while it was watched.
+    /// Returns a countdown that is over when the counter has restarted `periods` times between polls.
     pub fn new(periods: u32) -> Self {
         Self {
             periods,
@@ -62,14 +62,14 @@ impl Countdown {
         }
     }
 
-    /// Whether it is over.
+    /// Polls the counter. Returns whether the countdown is over.
     pub fn is_over(&mut self) -> bool {
-        // SAFETY: latching the count changes nothing but what is read next.
+        // SAFETY: latching the count only affects the next read.
         unsafe { ports::out8(COMMAND, Self::LATCH) };
         // SAFETY: the timer's ports touch no memory. Low byte first, as it was set.
         let [low, high] = [(); 2].map(|()| unsafe { ports::in8(CHANNEL_0) });
         let count = u16::from_le_bytes([low, high]);
-        // It counts down.
+        // The counter counts down, so a larger count means that it has restarted.
         if count > self.last {
             self.periods = self.periods.saturating_sub(1);
         }
@@ -79,7 +79,7 @@ impl Countdown {
     }
 }
 
-/// The interrupt handler's part.
+/// The interrupt handler's part: counts a tick.
 pub(super) fn tick() {
     TICKS.fetch_add(1, Ordering::Relaxed);
 }

@@ -1,4 +1,4 @@
-//! The bare machine's VGA: the driver's bus.
+//! The bare machine's VGA, as the Mode X driver's bus.
 
 use core::ptr::NonNull;
 
@@ -6,20 +6,20 @@ use modex::{Bus, Lane, PLANE_BYTES};
 
 use super::ports;
 
-/// The card's ports, and its window at A0000h. The one place that reaches video memory; always
-/// by volatile accesses, and never as a slice: a compiler that saw plain stores would merge or
-/// drop those that only a port write tells apart.
+/// The card's ports, and its window at A0000h. Only this type reaches video memory, always by volatile
+/// accesses and never as a slice: a compiler that saw plain stores would merge or drop stores that differ
+/// only in the port writes between them.
 #[derive(Debug)]
 pub struct Window {
     base: NonNull<u8>,
 }
 
 impl Window {
-    /// The window mapped at `base`.
+    /// Returns the window that is mapped at `base`.
     ///
     /// # Safety
-    /// `base..base + 64 KiB` is the card's window for the life of the value, and nothing else
-    /// reaches the window or the card's ports.
+    /// `base..base + 64 KiB` is the card's window for the life of the value, and nothing else reaches the
+    /// window or the card's ports.
     pub unsafe fn new(base: NonNull<u8>) -> Self {
         Self { base }
     }
@@ -51,16 +51,17 @@ impl Bus for Window {
             at.is_multiple_of(8),
             "a wide store at {at:04x} is not aligned"
         );
-        // SAFETY: a multiple of 8 below 64 KiB leaves 8 bytes to the end of the window.
+        // SAFETY: `at` is a multiple of 8 below 64 KiB, so at least 8 bytes remain in the window.
         let place = unsafe { self.base.add(usize::from(at)) }.cast::<u64>();
-        // SAFETY: inside the window, and aligned: the window starts on a page.
+        // SAFETY: the place is inside the window, and aligned, because the window starts on a page.
         unsafe { place.write_volatile(bytes) }
     }
 
     fn load8(&mut self, at: u16) -> u8 {
-        // SAFETY: any offset of 16 bits is inside the window.
+        // SAFETY: any 16-bit offset is inside the window.
         let place = unsafe { self.base.add(usize::from(at)) };
-        // SAFETY: inside the window; a load from the card fills its latches and no RAM.
+        // SAFETY: the place is inside the window. A load from the card fills the card's latches and changes
+        // no RAM.
         unsafe { place.read_volatile() }
     }
 
@@ -72,12 +73,12 @@ impl Bus for Window {
         }
         // SAFETY: `at` is inside the window.
         let base = unsafe { self.base.add(usize::from(at)) };
-        // SAFETY: from `at` to `end` the lane is inside the window, which `self` alone reaches.
+        // SAFETY: from `at` to `end` the lane is inside the window, which only `self` reaches.
         draw(unsafe { Lane::new(base, len) });
     }
 }
 
-/// By itself, so that a lane which is in the window has nothing to do with the words.
+/// Cold path: keeps the panic formatting out of the caller.
 #[cold]
 fn outside(at: u16, len: u16, step: usize) -> ! {
     panic!("{len} pixels, {step} bytes apart, at {at:04x} leave the window")
