@@ -1,8 +1,8 @@
-//! How ports and video memory are reached.
+//! Access to ports and video memory.
 
 use crate::Lane;
 
-/// Why an access is made, so that a bus that counts can count apart.
+/// The purpose of an access, so that a bus that counts can count purposes separately.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Purpose {
     /// Setting the mode and the palette; reading registers and memory back.
@@ -11,7 +11,7 @@ pub enum Purpose {
     Draw,
     /// Restoring the background of a page.
     Erase,
-    /// Writing over the picture.
+    /// Drawing the overlay over the frame.
     Overlay,
     /// Changing the start address and waiting for it.
     Flip,
@@ -19,33 +19,33 @@ pub enum Purpose {
 
 /// Port and video-memory access to a VGA.
 ///
-/// Reads take `&mut self`: reading a port of the VGA has side effects (3DA resets the
-/// attribute controller's flip-flop). Addresses are offsets into the window at A0000h, and
-/// wrap at 64 KiB by their type, as the card's do. Accesses happen in program order; an
-/// implementation must not let the compiler move a store across a port write, since a port
-/// write decides where the store goes.
+/// Reads take `&mut self`: reading a port of the VGA has side effects (3DA resets the attribute
+/// controller's flip-flop). Addresses are offsets into the window at A0000h. Their type wraps at 64
+/// KiB, as the card's addresses do. Accesses happen in program order. An implementation must not
+/// let the compiler move a store across a port write, because a port write decides where the store
+/// goes.
 pub trait Bus {
     /// Writes a byte to a port.
     fn out8(&mut self, port: u16, value: u8);
-    /// Writes a word to a port: on the index ports of sequencer, graphics controller and CRTC
-    /// that is the index in the low byte and its data in the high byte.
+    /// Writes a word to a port. On the index ports of sequencer, graphics controller and CRTC, the
+    /// low byte is the index and the high byte its data.
     fn out16(&mut self, port: u16, value: u16);
     /// Reads a byte from a port.
     fn in8(&mut self, port: u16) -> u8;
     /// Reads a word from a port.
     fn in16(&mut self, port: u16) -> u16;
-    /// Stores eight bytes at `at..at + 8`, little end first. `at` is a multiple of 8.
+    /// Stores eight bytes at `at..at + 8`, lowest byte first. `at` is a multiple of 8.
     fn store64(&mut self, at: u16, bytes: u64);
-    /// Loads the byte at `at`, of the plane that Read Map names. All four latches are filled.
+    /// Loads the byte at `at` from the plane that Read Map selects. Fills all four latches.
     fn load8(&mut self, at: u16) -> u8;
-    /// Lends `draw` the `len` bytes at `at`, `at + STEP`, ..., and carries out what it stored
-    /// before returning. All of them lie inside the window.
+    /// Lends `draw` the `len` bytes at `at`, `at + STEP`, ..., and carries out its stores before
+    /// returning. All of the bytes lie inside the window.
     fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>));
-    /// Announces what the next accesses are for.
+    /// Announces the purpose of the following accesses.
     fn purpose(&mut self, _purpose: Purpose) {}
 }
 
-/// A bus that is only lent, so that a driver can be put on a card that outlives it.
+/// A borrowed bus is a bus, so that a driver can use a card that outlives it.
 impl<B: Bus> Bus for &mut B {
     fn out8(&mut self, port: u16, value: u8) {
         B::out8(self, port, value);

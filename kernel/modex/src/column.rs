@@ -1,14 +1,14 @@
-//! What a texture mapper writes through.
+//! Destinations: the contract by which a texture mapper writes pixels.
 
 use core::marker::PhantomData;
 use core::ptr::NonNull;
 
 use crate::{HEIGHT, STRIDE, WIDTH};
 
-/// A place for pixels, addressed by runs that lie in one plane.
+/// A destination for pixels, addressed by lanes that lie in one plane.
 ///
-/// Which plane stores reach is the destination's state, as it is the card's: [`select`] it, then
-/// ask for [`lane`]s of that plane. [`column`] does both.
+/// The plane that stores reach is part of the destination's state, as it is of the card's:
+/// [`select`] it, then request [`lane`]s of that plane. [`column`] does both.
 ///
 /// [`select`]: Destination::select
 /// [`lane`]: Destination::lane
@@ -17,12 +17,13 @@ pub trait Destination {
     /// Selects the plane of screen column `x`.
     fn select(&mut self, x: u16);
 
-    /// Lends `draw` the `len` pixels from (x, y) on, `STEP` bytes apart, their plane already
-    /// selected: with [`STRIDE`] a column; with 1 every fourth pixel of a row.
+    /// Lends `draw` the `len` pixels from (x, y) on, `STEP` bytes apart; their plane must be
+    /// selected. A `STEP` of [`STRIDE`] is a column, and a `STEP` of 1 is every fourth pixel of a
+    /// row.
     ///
     /// # Panics
-    /// If the lane is empty or leaves the 320x240 picture: coverage never asks for that, and
-    /// a store outside the page would show up in another one.
+    /// If the lane is empty or leaves the 320x240 frame. Coverage never requests such a lane, and a
+    /// store outside the page would appear in another page.
     fn lane<const STEP: usize>(
         &mut self,
         x: u16,
@@ -31,7 +32,7 @@ pub trait Destination {
         draw: impl FnOnce(Lane<'_, STEP>),
     );
 
-    /// Lends `draw` the `len` pixels from (x, y) down, their plane selected.
+    /// Selects the plane of column `x`, and lends `draw` the `len` pixels from (x, y) down.
     ///
     /// # Panics
     /// As [`Destination::lane`].
@@ -40,8 +41,8 @@ pub trait Destination {
         self.lane(x, y, len, draw);
     }
 
-    /// Writes the `len` pixels from (x, y) to the right in order, the plane selected for each;
-    /// `texel` is called once for each. Which plane is selected afterwards is not said.
+    /// Writes the `len` pixels from (x, y) to the right in order, and selects the plane for each;
+    /// `texel` is called once for each. The plane that is selected afterwards is unspecified.
     ///
     /// # Panics
     /// As [`Destination::lane`].
@@ -52,9 +53,9 @@ pub trait Destination {
         }
     }
 
-    /// Lends `draw` line `y` in RAM, and writes the `len` pixels from (x, y) to the right as it
-    /// leaves them, one plane after the other: `draw` stores to these pixels and nowhere else.
-    /// Neither what was there is said, nor which plane is selected afterwards.
+    /// Lends `draw` line `y` in RAM, then writes the `len` pixels from (x, y) to the right from it,
+    /// one plane after the other. `draw` must store to these pixels and to no others. The line's
+    /// initial contents and the plane that is selected afterwards are unspecified.
     ///
     /// # Panics
     /// As [`Destination::lane`].
@@ -76,7 +77,7 @@ pub trait Destination {
 /// A line of the screen in RAM: pixel x is `line[x & 3][x / 4]`.
 pub type Line<'a> = [&'a mut [u8; STRIDE]; 4];
 
-/// The last screen column of a row, checked to lie in the picture.
+/// Returns the last screen column of a row, after checking that the row lies in the frame.
 pub(crate) fn check_row(x: u16, y: u16, len: u16) -> u16 {
     let more = len.wrapping_sub(1);
     assert!(
@@ -86,14 +87,14 @@ pub(crate) fn check_row(x: u16, y: u16, len: u16) -> u16 {
     x + more
 }
 
-/// A column of one plane: 80 bytes from pixel to pixel.
+/// A column of one plane: a lane with 80 bytes from pixel to pixel.
 pub type Column<'a> = Lane<'a, STRIDE>;
 
-/// `len` bytes of one plane, a base and then every `STEP`, open for writing once.
+/// A lane: `len` bytes of one plane, a base and then every `STEP`th byte, open for writing once.
 ///
-/// The only type that stores to video memory one byte at a time. The stores are volatile: the
-/// compiler sees neither the card's planes nor the port writes that select them, and was seen
-/// deleting a plain store as overwritten.
+/// This is the only type that stores to video memory one byte at a time. The stores are volatile:
+/// the compiler sees neither the card's planes nor the port writes that select them, and it has
+/// deleted a plain store as overwritten.
 #[derive(Debug)]
 pub struct Lane<'a, const STEP: usize> {
     base: NonNull<u8>,
@@ -102,7 +103,7 @@ pub struct Lane<'a, const STEP: usize> {
 }
 
 impl<'a, const STEP: usize> Lane<'a, STEP> {
-    /// The first byte of a slice, and every `STEP`th after it.
+    /// Returns the lane of a slice's first byte and every `STEP`th byte after it.
     pub fn over(bytes: &'a mut [u8]) -> Self {
         let len = bytes.len().div_ceil(STEP);
         assert!(len <= usize::from(u16::MAX), "{len} pixels in a lane");
@@ -111,11 +112,11 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         unsafe { Self::new(NonNull::from(bytes).cast(), len as u16) }
     }
 
-    /// A lane of `len` bytes from `base`.
+    /// Returns a lane of `len` bytes from `base`.
     ///
     /// # Safety
-    /// For as long as the lane lives, `base.add(i * STEP)` is valid for volatile writes of
-    /// a byte for every `i < len`, and nothing else reads or writes there.
+    /// For as long as the lane lives, `base.add(i * STEP)` is valid for volatile writes of a byte
+    /// for every `i < len`, and nothing else reads or writes there.
     pub unsafe fn new(base: NonNull<u8>, len: u16) -> Self {
         Self {
             base,
@@ -124,26 +125,26 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         }
     }
 
-    /// Pixels.
+    /// Returns the number of pixels.
     pub fn len(&self) -> u16 {
         self.len
     }
 
-    /// Whether it has none.
+    /// Returns whether the lane has no pixels.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    /// Where the first byte is. What [`Lane::new`] was promised holds as long as the lane lives:
-    /// a tuned loop writes there, volatile, and nowhere else.
+    /// Returns the address of the first byte. The contract of [`Lane::new`] holds as long as the
+    /// lane lives: a tuned loop writes to the lane's bytes, volatile, and nowhere else.
     pub fn as_ptr(&mut self) -> *mut u8 {
         self.base.as_ptr()
     }
 
-    /// The `pixels` from pixel `first` on.
+    /// Lends the `pixels` pixels from pixel `first` on.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// If the lane has fewer pixels.
     #[inline]
     pub fn part(&mut self, first: u16, pixels: u16) -> Lane<'_, STEP> {
         assert!(
@@ -151,7 +152,7 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
             "{pixels} of {} pixels from pixel {first} on",
             self.len
         );
-        // The last pixel may be the last byte of what is lent: no pointer goes past it.
+        // The last pixel may be the last byte of the borrowed memory: no pointer goes past it.
         let base = match first < self.len {
             // SAFETY: `first < len`, so by the contract of `new` the address is inside.
             true => unsafe { self.base.add(usize::from(first) * STEP) },
@@ -164,17 +165,17 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         }
     }
 
-    /// The first `pixels`, and those after them.
+    /// Splits the lane into its first `pixels` pixels and the rest.
     ///
     /// # Panics
-    /// If there are not so many.
+    /// If the lane has fewer pixels.
     #[inline]
     pub fn split(self, pixels: u16) -> (Self, Self) {
         if pixels > self.len {
             missing(pixels, self.len);
         }
         let Self { base, len, lent } = self;
-        // The last pixel may be the last byte of what is lent: no pointer goes past it.
+        // The last pixel may be the last byte of the borrowed memory: no pointer goes past it.
         let after = match pixels < len {
             // SAFETY: `pixels < len`, so by the contract of `new` the address is inside.
             true => unsafe { base.add(usize::from(pixels) * STEP) },
@@ -194,8 +195,8 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         (first, second)
     }
 
-    /// Lanes of `pixels` pixels each, from the first pixel on. Those at the end that do not fill
-    /// one are in none.
+    /// Returns lanes of `pixels` pixels each, from the first pixel on. Pixels at the end that do
+    /// not fill a lane are left out.
     ///
     /// # Panics
     /// If `pixels` is 0.
@@ -207,8 +208,8 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
             .step_by(step)
             .map(move |offset| {
                 // SAFETY: this many lanes fit in the length, so by the contract of `new` the
-                // address is inside, and so are the `pixels` from there on, which are in no other
-                // lane.
+                // address is inside, and so are the `pixels` pixels from there on, which are in no
+                // other lane.
                 let base = unsafe { base.add(offset) };
                 let len = pixels;
                 Self { base, len, lent }
@@ -228,7 +229,7 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
     }
 }
 
-/// By itself, so that a lane which has its pixels has nothing to do with the words.
+/// Cold path: keeps the panic formatting out of the caller.
 #[cold]
 fn missing(pixels: u16, len: u16) -> ! {
     panic!("{pixels} of {len} pixels")

@@ -1,9 +1,9 @@
-//! Exact counts of what reaches the card.
+//! Exact counts of the accesses that reach the card.
 
 use crate::registers::{MAP_MASK, SEQUENCER};
 use crate::{Bus, Lane, Purpose};
 
-/// What was done for one purpose.
+/// The accesses for one purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
     /// Port writes, Map Mask included.
@@ -12,13 +12,13 @@ pub struct Tally {
     pub map_mask: u64,
     /// Store instructions to video memory.
     pub stores: u64,
-    /// Bytes that those stores carried (each reaches one to four planes).
+    /// Bytes that these stores carried (each reaches one to four planes).
     pub bytes: u64,
     /// Loads from video memory.
     pub loads: u64,
 }
 
-/// What was done, by purpose.
+/// The accesses by purpose.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
     /// [`Purpose::Setup`].
@@ -34,7 +34,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// The tally of one purpose.
+    /// Returns the tally of one purpose.
     pub fn of(&mut self, purpose: Purpose) -> &mut Tally {
         match purpose {
             Purpose::Setup => &mut self.setup,
@@ -45,7 +45,7 @@ impl Counts {
         }
     }
 
-    /// Each purpose's name and tally, in a fixed order.
+    /// Returns each purpose's name and tally, in a fixed order.
     pub fn named(&self) -> [(&'static str, Tally); 5] {
         [
             ("setup", self.setup),
@@ -57,7 +57,7 @@ impl Counts {
     }
 }
 
-/// A bus that passes everything on and counts what reaches the card.
+/// A bus that forwards everything and counts what reaches the card.
 #[derive(Debug)]
 pub struct Counted<B> {
     bus: B,
@@ -66,7 +66,7 @@ pub struct Counted<B> {
 }
 
 impl<B> Counted<B> {
-    /// Counts what goes to `bus`, from zero.
+    /// Counts the accesses to `bus`, starting at zero.
     pub fn new(bus: B) -> Self {
         Self {
             bus,
@@ -75,17 +75,17 @@ impl<B> Counted<B> {
         }
     }
 
-    /// What was done so far.
+    /// Returns the counts so far.
     pub fn counts(&self) -> &Counts {
         &self.counts
     }
 
-    /// What was done since the last call, and starts again at zero.
+    /// Returns the counts since the last call, and resets them to zero.
     pub fn take_counts(&mut self) -> Counts {
         core::mem::take(&mut self.counts)
     }
 
-    /// The bus underneath.
+    /// Returns the bus underneath.
     pub fn inner(&mut self) -> &mut B {
         &mut self.bus
     }

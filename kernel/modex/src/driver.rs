@@ -14,18 +14,20 @@ pub type Rgb6 = [u8; 3];
 /// The DAC's 256 entries.
 pub type Palette = [Rgb6; 256];
 
-/// Polls of Input Status 1 before the card is called dead: seconds, where a frame takes 17 ms.
+/// Reads of Input Status 1 before the driver reports that the card does not respond. They take
+/// seconds, while a refresh takes 17 ms.
 const POLLS: u32 = 10_000_000;
 
-/// Bytes of one wide store, and lines of bookkeeping: a group is 8 bytes, 32 pixels, of a line.
+/// Bytes of one wide store, and of one group of the records in [`Drawn`]: 8 bytes, 32 pixels, of a
+/// line.
 const GROUP_BYTES: usize = 8;
 const GROUPS: usize = STRIDE / GROUP_BYTES;
 const GROUP_PIXELS: u16 = 4 * GROUP_BYTES as u16;
 
-/// Why Mode X is not set.
+/// The reason why Mode X could not be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetError {
-    /// A register does not read back the value that was written.
+    /// A register reads back another value than the one written.
     Register {
         /// The block, as [`Mode::blocks`] names it.
         block: &'static str,
@@ -37,8 +39,8 @@ pub enum SetError {
         actual: u8,
     },
     /// The window at A0000h is not four planes of 64 KiB: a byte of a plane does not hold the value
-    /// that was stored through Map Mask. RAM in place of the window looks like this, since it keeps
-    /// one byte where the card keeps four.
+    /// that was stored through Map Mask. RAM in place of the window fails this way, because it
+    /// keeps one byte where the card keeps four.
     Plane {
         /// The plane, 0 to 3.
         plane: u8,
@@ -49,16 +51,16 @@ pub enum SetError {
         /// The value that the load through Read Map returned.
         actual: u8,
     },
-    /// Input Status 1 never had a state that each frame has.
+    /// Input Status 1 never reported a state that occurs in every refresh.
     Beam(Stuck),
 }
 
 /// A state of the beam that Input Status 1 does not report: `display` or `vertical retrace`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stuck {
-    /// The state that was waited for.
+    /// The state that the driver waited for.
     pub expected: &'static str,
-    /// The last value that Input Status 1 read.
+    /// The last value read from Input Status 1.
     pub actual: u8,
 }
 
@@ -101,19 +103,19 @@ impl fmt::Display for SetError {
 
 impl core::error::Error for SetError {}
 
-/// What a page was drawn on since it last held the bare background: in each group of 32 pixel
-/// columns the lines from a top to a bottom. Both only ever grow, and from zero: a lane is added
-/// without asking whether its group had any.
+/// The parts of a page that were drawn on since the page last held the bare background: for each
+/// group of 32 pixel columns, the lines from a top to a bottom. Both records only grow, and start
+/// at zero, so a lane is added without testing whether its group had any.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn {
-    /// Lines from the top down to the page's end.
+    /// Lines from the top to the page's end.
     rise: [u16; GROUPS],
     /// The line after the last.
     bottom: [u16; GROUPS],
 }
 
 impl Drawn {
-    /// All zeros, so that what begins with it needs no room in the kernel's image.
+    /// All zeros, so that a value that begins with it takes no space in the kernel's image.
     pub(crate) const NOTHING: Self = Self {
         rise: [0; GROUPS],
         bottom: [0; GROUPS],
@@ -126,7 +128,7 @@ impl Drawn {
     /// Adds a lane of `len` pixels from (x, y) on.
     ///
     /// # Panics
-    /// If it leaves the picture.
+    /// If the lane leaves the frame.
     #[inline]
     pub(crate) fn lane<const STEP: usize>(&mut self, x: u16, y: u16, len: u16) {
         let (last, bottom) = check_lane::<STEP>(x, y, len);
@@ -137,7 +139,8 @@ impl Drawn {
         }
     }
 
-    /// Adds the pixel columns `first..=last`, lines `top..bottom`, all of them in the picture.
+    /// Adds the pixel columns `first..=last`, lines `top..bottom`, all of which must be in the
+    /// frame.
     #[inline]
     pub(crate) fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
         for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
@@ -148,7 +151,7 @@ impl Drawn {
     #[inline]
     fn add_to(&mut self, group: usize, top: u16, bottom: u16) {
         let rise = HEIGHT as u16 - top;
-        // Most lanes lie beside others: nothing is stored for them.
+        // Most lanes lie beside other lanes and store nothing here.
         if self.rise[group] < rise {
             self.rise[group] = rise;
         }
@@ -157,7 +160,7 @@ impl Drawn {
         }
     }
 
-    /// What either was drawn on.
+    /// Returns the parts that were drawn on in either record.
     fn or(&self, other: &Self) -> Self {
         let mut both = *self;
         for group in 0..GROUPS {
@@ -170,7 +173,8 @@ impl Drawn {
         both
     }
 
-    /// The groups of 8 bytes drawn on, counted from the page's start, each with its line.
+    /// Returns the groups of 8 bytes that were drawn on, counted from the page's start, each with
+    /// its line.
     pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, usize)> {
         let lines = self.rise.into_iter().zip(self.bottom);
         lines.enumerate().flat_map(|(group, (rise, bottom))| {
@@ -182,40 +186,42 @@ impl Drawn {
 
 /// The card in Mode X, with its three pages.
 ///
-/// Pages rotate. A page is drawn on only when the card can't be showing it any more.
+/// Pages rotate. A page is drawn on only when the card cannot be showing it any more.
 ///
 /// # Why nothing tears
 ///
-/// The pages share the low byte of their start address, so a flip is one write of one byte: at any
-/// moment the CRTC has one page's address or the other's. It takes the address over once a frame, at
-/// a moment that differs from card to card, but lies after the last line that is shown and before
-/// the next frame's first line.
+/// The pages share the low byte of their start address, so a flip is a single write of one byte: at
+/// any moment the CRTC has the address of one page or of the other. The CRTC latches the start
+/// address once per refresh. The moment differs from card to card, but it always lies after the
+/// last displayed line and before the first line of the next refresh.
 ///
-/// [`ModeX::flip`] writes at any time. [`ModeX::settle`] reads Input Status 1, all of it after that
-/// write: first until the card displays (at a time A), then until it is in the vertical retrace (at a
-/// later time B). The end of a frame's display lies between A and B. The take-over that follows this
-/// end comes after A, so after the write, and takes the new page. No line of the old page is shown
-/// between the end of the display and that take-over, nor ever after. So from B on the old page is free.
+/// [`ModeX::flip`] writes the address at any time. After that write, [`ModeX::settle`] reads Input
+/// Status 1: first until the card displays (at a time A), then until the card is in the vertical
+/// retrace (at a later time B). The end of a refresh's display lies between A and B. The latch that
+/// follows this end comes after A, so after the write, and gets the new page. No line of the old
+/// page is shown between the end of the display and that latch, or ever after. So from B on the old
+/// page is free.
 ///
-/// The argument needs no bound on any time: an interrupt between two accesses only makes A or B later.
-/// The other order, to see the card display and then to write, does need one: the display may be seen
-/// on its last line, and the write may come after the take-over, while the retrace that is then
-/// waited for has already begun. The old page would be drawn on while it is shown for one more frame.
+/// The argument needs no bound on any time: an interrupt between two accesses only makes A or B
+/// later. The other order, to see the card display and then to write, does need a bound: the driver
+/// may see the display on its last line, and its write may come after the latch, while the retrace
+/// that it then waits for has already begun. It would draw on the old page while the card shows
+/// that page for another refresh.
 #[derive(Debug)]
 pub struct ModeX<B> {
     bus: B,
     drawn: [Drawn; PAGES],
-    /// The page whose start address the CRTC was given last.
+    /// The page whose start address was last written to the CRTC.
     front: usize,
-    /// The page that is or was last drawn on.
+    /// The page that is being drawn on, or was last drawn on.
     back: usize,
-    /// Pages that may be on the screen: `front`, and those flipped away from since the last
+    /// Pages that may be on the screen: `front`, and the pages flipped away from since the last
     /// [`ModeX::settle`].
     visible: [bool; PAGES],
 }
 
 impl<B: Bus> ModeX<B> {
-    /// The card behind `bus`, set as [`ModeX::reset`] sets it.
+    /// Returns the card behind `bus`, set as [`ModeX::reset`] sets it.
     ///
     /// # Errors
     /// As [`ModeX::reset`].
@@ -232,11 +238,11 @@ impl<B: Bus> ModeX<B> {
     }
 
     /// Sets the mode, reads it back, proves that the window is planar, loads the palette and clears
-    /// all four planes; page 0 is shown. What follows depends on nothing that was before.
+    /// all four planes; page 0 is shown. The result does not depend on the card's earlier state.
     ///
     /// # Errors
-    /// The first register that reads back wrong, or the first byte of a plane that does; a beam that
-    /// does not move.
+    /// The first register that reads back wrong, or the first byte of a plane that does; or a beam
+    /// that does not move.
     pub fn reset(&mut self, palette: &Palette) -> Result<(), SetError> {
         let bus = &mut self.bus;
         bus.purpose(Purpose::Setup);
@@ -248,8 +254,8 @@ impl<B: Bus> ModeX<B> {
         for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
             bus.store64(at as u16, 0);
         }
-        // Until then the CRTC shows from the start address that was there before, and that is a page
-        // which may be drawn on next.
+        // Until the next refresh the CRTC displays from the old start address, where a page may lie
+        // that is drawn on next.
         self.wait_for_frame().map_err(SetError::Beam)?;
         let bus = &mut self.bus;
         let clocking = MODE_X.sequencer[usize::from(CLOCKING_MODE)];
@@ -260,10 +266,12 @@ impl<B: Bus> ModeX<B> {
         Ok(())
     }
 
-    /// The page after the one drawn last, on its bare background: `background[y]` is the
-    /// colour of line y. Waits as [`ModeX::settle`] first if that page may still be on the screen.
+    /// Returns the page after the page drawn last, on its bare background: `background[y]` is the
+    /// colour of line y. Waits first, as [`ModeX::settle`] does, if that page may still be on the
+    /// screen.
     ///
-    /// Only what the page was drawn on is restored, in wide stores to all planes at once.
+    /// Only the parts of the page that were drawn on are restored, in wide stores to all planes at
+    /// once.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) -> Canvas<'_, B> {
         self.turn();
         self.bus.purpose(Purpose::Erase);
@@ -282,10 +290,11 @@ impl<B: Bus> ModeX<B> {
         }
     }
 
-    /// Takes the page after the one drawn last, once it can't be on the screen any more.
+    /// Moves to the page after the page drawn last, and waits until it cannot be on the screen any
+    /// more.
     fn turn(&mut self) {
         self.back = (self.back + 1) % PAGES;
-        // Only after pages that were drawn and not flipped to: the front page is not free.
+        // This happens only after pages that were drawn without a flip: the front page is not free.
         if self.back == self.front {
             self.back = (self.front + 1) % PAGES;
         }
@@ -294,9 +303,9 @@ impl<B: Bus> ModeX<B> {
         }
     }
 
-    /// Has the page after the one drawn last hold what `offscreen` holds, both on the same
-    /// background: stores what either was drawn on, eight bytes at once, plane by plane. Waits as
-    /// [`ModeX::begin`] does.
+    /// Copies `offscreen` to the page after the page drawn last, where both are on the same
+    /// background. Stores the parts that were drawn on in either, eight bytes at a time, plane by
+    /// plane. Waits as [`ModeX::begin`] does.
     pub fn present(&mut self, offscreen: &Offscreen) {
         self.turn();
         self.bus.purpose(Purpose::Draw);
@@ -313,7 +322,7 @@ impl<B: Bus> ModeX<B> {
         self.drawn[self.back] = *offscreen.drawn();
     }
 
-    /// Shows the page drawn last, from the next frame on.
+    /// Shows the page drawn last, from the next refresh on.
     pub fn flip(&mut self) {
         const {
             assert!(
@@ -328,10 +337,10 @@ impl<B: Bus> ModeX<B> {
         self.visible[self.front] = true;
     }
 
-    /// Waits until the last flip holds: the page flipped to, and no other, will be shown.
+    /// Waits until the last flip has taken effect: from then on only the page flipped to is shown.
     ///
     /// # Panics
-    /// If the card reports no display or no retrace in some seconds.
+    /// If the card reports no display or no retrace for some seconds.
     pub fn settle(&mut self) {
         self.bus.purpose(Purpose::Flip);
         if let Err(stuck) = self.wait_for_frame() {
@@ -341,24 +350,24 @@ impl<B: Bus> ModeX<B> {
         self.visible[self.front] = true;
     }
 
-    /// The page on the screen once the last flip holds, 0 to 2.
+    /// Returns the page that is on the screen once the last flip has taken effect, 0 to 2.
     pub fn shown_page(&self) -> usize {
         self.front
     }
 
-    /// Every register of the mode as the card has it now.
+    /// Returns every register of the mode as the card has it now.
     pub fn registers(&mut self) -> Mode {
         self.bus.purpose(Purpose::Setup);
         read_mode(&mut self.bus)
     }
 
-    /// The start address of [`ModeX::shown_page`].
+    /// Returns the start address of [`ModeX::shown_page`].
     pub fn start_address(&self) -> u16 {
         page_start(self.front) as u16
     }
 
     /// Reads pixels back from the card: pixel i is in plane i & 3 at `at` + i / 4, which wraps
-    /// within the plane. No byte of video memory is written.
+    /// within the plane. Writes no byte of video memory.
     pub fn load(&mut self, at: u16, pixels: &mut [u8]) {
         self.bus.purpose(Purpose::Setup);
         for plane in 0..4 {
@@ -379,12 +388,12 @@ impl<B: Bus> ModeX<B> {
         [(); 256].map(|()| [(); 3].map(|()| self.bus.in8(PEL_DATA)))
     }
 
-    /// The bus underneath.
+    /// Returns the bus underneath.
     pub fn bus(&mut self) -> &mut B {
         &mut self.bus
     }
 
-    /// Waits until a start address that was written before is taken over: see [`ModeX`].
+    /// Waits until a start address that was written earlier has been latched: see [`ModeX`].
     fn wait_for_frame(&mut self) -> Result<(), Stuck> {
         self.wait("display", |status| status & DISPLAY_DISABLED == 0)?;
         self.wait("vertical retrace", |status| status & VERTICAL_RETRACE != 0)
@@ -411,7 +420,7 @@ pub struct Canvas<'a, B> {
 }
 
 impl<B: Bus> Canvas<'_, B> {
-    /// Has what follows counted for the overlay: the picture is drawn.
+    /// Counts the following accesses for the overlay. Call it after the frame has been drawn.
     pub fn overlay(&mut self) -> &mut Self {
         self.bus.purpose(Purpose::Overlay);
         self
@@ -436,8 +445,9 @@ impl<B: Bus> Destination for Canvas<'_, B> {
         self.bus.lane(at as u16, len, draw);
     }
 
-    /// One Map Mask write and one store a pixel. The mask is kept twice in a byte and rotated: the
-    /// bit that comes round into bit 0 is the step of the address, from plane 3 to plane 0.
+    /// Writes the row with one Map Mask write and one store per pixel. The mask is kept twice in a
+    /// byte and rotated: the bit that arrives in bit 0 is the step of the address, from plane 3 to
+    /// plane 0.
     fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {
         let last = check_row(x, y, len);
         self.drawn.add(x, last, y, y + 1);
@@ -452,7 +462,8 @@ impl<B: Bus> Destination for Canvas<'_, B> {
     }
 }
 
-/// The last screen column of a lane, and the line after its last; checked to lie in the picture.
+/// Returns the last screen column of a lane and the line after its last, after checking that the
+/// lane lies in the frame.
 #[inline]
 pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u16) {
     const {
@@ -461,7 +472,7 @@ pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u
             "columns, or every fourth pixel of a row"
         )
     };
-    // Of an empty lane it is 65 535, which leaves the picture as well.
+    // For an empty lane `more` is 65 535, which leaves the frame as well.
     let more = u32::from(len.wrapping_sub(1));
     let (right, down) = if STEP == STRIDE {
         (0, more)
@@ -475,7 +486,7 @@ pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u
     (last as u16, line as u16 + 1)
 }
 
-/// By itself, so that a lane which is in the picture has nothing to do with the words.
+/// Cold path: keeps the panic formatting out of the caller.
 #[cold]
 fn outside(x: u16, y: u16, len: u16, step: usize) -> ! {
     panic!("{len} pixels, {step} bytes apart, at ({x}, {y}) are not in the picture")
@@ -485,17 +496,17 @@ fn page_start(page: usize) -> usize {
     page * PAGE_BYTES
 }
 
-/// An indexed register in one word write: index in the low byte, data in the high byte.
+/// Writes an indexed register in one word write: index in the low byte, data in the high byte.
 fn write<B: Bus>(bus: &mut B, port: u16, index: u8, value: u8) {
     bus.out16(port, u16::from_le_bytes([index, value]));
 }
 
-/// Leaves the linear mode that the boot loader's VESA call left behind, which no register of the
-/// plain VGA tells of.
+/// Leaves the linear mode that the boot loader's VESA call left behind. No register of the plain
+/// VGA shows this mode.
 ///
-/// While DISPI is enabled QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card
-/// has no DISPI (its ID reads no B0Cx); while its SR7 bit 0 is set, stores go to linear memory
-/// past Map Mask. Of any other card no register outside the plain VGA keeps another value than it had.
+/// While DISPI is enabled, QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card
+/// has no DISPI (its ID does not read B0Cx); while its SR7 bit 0 is set, stores go to linear memory
+/// and bypass Map Mask. On any other card, every register outside the plain VGA keeps its value.
 fn leave_linear_mode<B: Bus>(bus: &mut B) {
     bus.out16(DISPI_INDEX, DISPI_ID);
     if bus.in16(DISPI_DATA) & 0xFFF0 == 0xB0C0 {
@@ -509,20 +520,20 @@ fn leave_linear_mode<B: Bus>(bus: &mut B) {
     for (port, index) in CIRRUS_EXTENSIONS {
         write(bus, port, index, 0);
     }
-    // The card's DAC has a register of its own behind PEL Mask: it opens after four reads, and
-    // holds the colour depth of the linear mode.
+    // The card's DAC has a hidden register behind PEL Mask. It opens after four reads, and holds
+    // the colour depth of the linear mode.
     for _ in 0..4 {
         bus.in8(PEL_MASK);
     }
     bus.out8(PEL_MASK, 0);
 }
 
-/// Unlocks a Cirrus Logic card's own registers. Returns false for any other card, whose SR6 then has
-/// the value that it had.
+/// Unlocks a Cirrus Logic card's own registers. Returns false for any other card, whose SR6 then
+/// has its old value again.
 ///
-/// A Cirrus answers to a key with a word that was not written: after any value but the key SR6 reads
-/// [`CIRRUS_LOCKED`], and after the key it reads the key. A register that just holds what is written
-/// fails the first question, and one that holds nothing fails both.
+/// A Cirrus answers a key with a value that was not written: after any value but the key, SR6 reads
+/// [`CIRRUS_LOCKED`], and after the key it reads the key. A register that simply holds the written
+/// value fails the first test, and a register that holds nothing fails both.
 fn unlock_cirrus<B: Bus>(bus: &mut B) -> bool {
     let read = |bus: &mut B| {
         bus.out8(SEQUENCER, CIRRUS_UNLOCK);
@@ -539,13 +550,13 @@ fn unlock_cirrus<B: Bus>(bus: &mut B) -> bool {
     true
 }
 
-/// Writes every register of the mode, the screen left off.
+/// Writes every register of the mode, but leaves the screen off.
 fn write_mode<B: Bus>(bus: &mut B, mode: &Mode) {
-    // The clock in Misc may only change while the sequencer is held in reset.
+    // The clock in Misc may change only while the sequencer is held in reset.
     write(bus, SEQUENCER, RESET, 0x01);
     bus.out8(MISC_WRITE, mode.misc);
     for (index, &value) in (0..).zip(&mode.sequencer).skip(1) {
-        // The screen stays off until the planes are cleared: no flash of old memory.
+        // The screen stays off until the planes are cleared, so old memory does not flash up.
         let off = if index == CLOCKING_MODE {
             SCREEN_DISABLE
         } else {
@@ -554,7 +565,8 @@ fn write_mode<B: Bus>(bus: &mut B, mode: &Mode) {
         write(bus, SEQUENCER, index, value | off);
     }
     write(bus, SEQUENCER, RESET, mode.sequencer[usize::from(RESET)]);
-    // CR11 bit 7 would make the writes to CR0-7 vanish; the table's own value sets it again.
+    // While CR11 bit 7 is set, the card ignores writes to CR0-7. The table's own value sets it
+    // again.
     let unprotected = mode.crtc[usize::from(VERTICAL_RETRACE_END)] & !PROTECT;
     write(bus, CRTC, VERTICAL_RETRACE_END, unprotected);
     for (index, &value) in (0..).zip(&mode.crtc) {
@@ -581,8 +593,8 @@ fn write_palette<B: Bus>(bus: &mut B, palette: &Palette) {
     }
 }
 
-/// Reads every register of the mode. The picture blanks for the time that the attribute
-/// controller's palette is open.
+/// Reads every register of the mode. The screen blanks while the attribute controller's palette is
+/// open.
 fn read_mode<B: Bus>(bus: &mut B) -> Mode {
     let mut mode = Mode {
         misc: bus.in8(MISC_READ),
@@ -616,7 +628,7 @@ fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), SetError> {
     let mut expected = *mode;
     expected.sequencer[usize::from(CLOCKING_MODE)] |= SCREEN_DISABLE;
     let actual = read_mode(bus);
-    // QEMU has no PEL Mask: what is read there says nothing.
+    // QEMU has no PEL Mask, so the value read there is meaningless.
     expected.pel_mask = actual.pel_mask;
     for ((block, expected), (_, actual)) in expected.blocks().into_iter().zip(actual.blocks()) {
         for (index, (&expected, &actual)) in (0..).zip(expected.iter().zip(actual)) {
@@ -634,18 +646,18 @@ fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), SetError> {
 }
 
 /// Proves that the window is four planes of 64 KiB: stores a different byte in each plane, at the
-/// start of each half of the window, through Map Mask, and loads each through Read Map. All eight
-/// bytes differ, so no plane can stand in for another plane, nor one half for the other.
+/// start of each half of the window, through Map Mask, and loads each byte through Read Map. All
+/// eight bytes differ, so no plane can stand in for another plane, and neither half for the other.
 ///
-/// The registers alone prove nothing about the window: they read back right while a machine shows
-/// RAM at A0000h.
+/// The registers prove nothing about the window: they read back correctly even while a machine
+/// shows RAM at A0000h.
 fn check_planes<B: Bus>(bus: &mut B) -> Result<(), SetError> {
     const HALVES: [u16; 2] = [0, (PLANE_BYTES / 2) as u16];
     let bytes = || {
         let places = HALVES
             .into_iter()
             .flat_map(|at| (0..4).map(move |plane| (at, plane)));
-        // Not 00 or FF, which a window with nothing behind it reads.
+        // Neither 00 nor FF, which an empty window reads.
         places.zip(0x51..)
     };
     for ((at, plane), byte) in bytes() {

@@ -1,25 +1,25 @@
 //! VGA Mode X, 320x240 in 256 colours, by its registers.
 //!
-//! # The shape of the memory
+//! # Layout of video memory
 //!
-//! Unchained 256-colour memory is four planes of 64 KiB behind one 64 KiB window. Pixel
-//! (x, y) of a page lies in plane `x & 3` at `start + 80 y + x / 4`; the Map Mask register
-//! says which planes a store reaches. A step to the right changes the plane, a step down does
-//! not: that is why the renderer draws columns and writes Map Mask once for each.
+//! Unchained 256-colour memory consists of four planes of 64 KiB behind one window of 64 KiB. Pixel
+//! (x, y) of a page lies in plane `x & 3` at `start + 80 y + x / 4`. The Map Mask register selects
+//! the planes that a store reaches. A step to the right changes the plane, and a step down does
+//! not. That is why the renderer draws columns and writes Map Mask once for each.
 //!
 //! # Three parts
 //!
-//! - [`registers`]: the datasheet. Ports, indices and the mode as a table; no access.
-//! - [`Bus`]: how bytes move. The bare machine implements it at its edge, tests implement it
-//!   with a recorder. The trait is open, because the point of it is that anyone can plug in a
-//!   model of the card.
+//! - [`registers`]: the datasheet. Ports, indices and the mode as a table; no access to hardware.
+//! - [`Bus`]: port and memory access. The bare machine implements it for the hardware, and tests
+//!   implement it with a recorder. The trait is open, so that anyone can plug in a model of the
+//!   card.
 //! - [`ModeX`]: the driver. It sets the mode from the table and reads it back, owns the three
-//!   pages, knows what each was drawn on, erases only that, and flips in the order that is
-//!   safe on every card.
+//!   pages, records which parts of each were drawn on, erases only these, and flips in the order
+//!   that is safe on every card.
 //!
-//! [`Destination`] is the one contract by which a texture mapper reaches pixels; [`Canvas`]
-//! (a page of the card), [`PlanarBuffer`] (the same shape in RAM), [`Offscreen`] (one that can be
-//! presented) and [`Window`] (a part of any of them) implement it.
+//! [`Destination`] is the only contract by which a texture mapper writes pixels. [`Canvas`] (a page
+//! of the card), [`PlanarBuffer`] (a page of the same layout in RAM), [`Offscreen`] (a page in RAM
+//! that can be presented) and [`Window`] (a part of any of them) implement it.
 #![no_std]
 
 mod bus;
@@ -43,11 +43,11 @@ pub use window::Window;
 pub const WIDTH: usize = 320;
 /// Lines in a page.
 pub const HEIGHT: usize = 240;
-/// Bytes from a pixel to the one below it, in its plane: CR13 (28h) words.
+/// Bytes from a pixel to the pixel below it, in its plane: CR13 (28h) words.
 pub const STRIDE: usize = WIDTH / 4;
 /// Bytes of a page in each plane.
 pub const PAGE_BYTES: usize = STRIDE * HEIGHT;
-/// Bytes of each plane that the window at A0000h shows.
+/// Bytes of each plane that are visible through the window at A0000h.
 pub const PLANE_BYTES: usize = 0x1_0000;
-/// Pages that fit into a plane; the 7 936 bytes left over hold no fourth.
+/// Pages that fit into a plane. The 7 936 bytes left over are too few for a fourth.
 pub const PAGES: usize = PLANE_BYTES / PAGE_BYTES;

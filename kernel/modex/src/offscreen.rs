@@ -1,25 +1,25 @@
-//! A page in RAM to draw on, and to present.
+//! A page in RAM to draw on and to present.
 
 use crate::column::check_row;
 use crate::driver::Drawn;
 use crate::{Destination, HEIGHT, Lane, Line, PlanarBuffer};
 
-/// A page in RAM that knows what it was drawn on.
+/// A page in RAM that records where it was drawn on.
 ///
-/// Drawn on in any order of planes it costs no port write; [`ModeX::present`] then stores it eight
-/// bytes at once, a plane after the other.
+/// Drawing on it costs no port writes, in any order of planes. [`ModeX::present`] then stores it
+/// eight bytes at a time, one plane after the other.
 ///
 /// [`ModeX::present`]: crate::ModeX::present
 #[derive(Clone, Copy, Debug)]
 pub struct Offscreen {
     page: PlanarBuffer,
     drawn: Drawn,
-    /// The background is on it.
+    /// Whether the background has been painted.
     painted: bool,
 }
 
 impl Offscreen {
-    /// A page of zeros, on which no background counts as painted.
+    /// Returns a page of zeros, whose background counts as not painted.
     pub const fn new() -> Self {
         Self {
             page: PlanarBuffer::new(),
@@ -28,8 +28,8 @@ impl Offscreen {
         }
     }
 
-    /// The page on its bare background: `background[y]` is the colour of line y. Only what was
-    /// drawn on is restored.
+    /// Restores the bare background: `background[y]` is the colour of line y. Only the parts that
+    /// were drawn on are restored.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) {
         if !core::mem::replace(&mut self.painted, true) {
             self.drawn = Drawn::EVERYTHING;
@@ -42,17 +42,18 @@ impl Offscreen {
         }
     }
 
-    /// Has the next [`Offscreen::begin`] paint all of the background: it is another one.
+    /// Makes the next [`Offscreen::begin`] paint the whole background, because the background has
+    /// changed.
     pub fn forget(&mut self) {
         self.painted = false;
     }
 
-    /// The page.
+    /// Returns the page.
     pub fn page(&self) -> &PlanarBuffer {
         &self.page
     }
 
-    /// What it was drawn on since its background was bare.
+    /// Returns the parts that were drawn on since the background was bare.
     pub(crate) fn drawn(&self) -> &Drawn {
         &self.drawn
     }

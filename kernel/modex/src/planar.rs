@@ -1,4 +1,4 @@
-//! A page in RAM, in the shape that the card has it.
+//! A page in RAM with the card's planar layout.
 
 use core::ptr::NonNull;
 
@@ -14,14 +14,14 @@ pub struct PlanarBuffer {
 }
 
 impl PlanarBuffer {
-    /// A page of zeros.
+    /// Returns a page of zeros.
     pub const fn new() -> Self {
         Self {
             planes: [[0; PAGE_BYTES]; 4],
         }
     }
 
-    /// Paints every line in the colour that `background` gives it.
+    /// Paints every line y in the colour `background[y]`.
     pub fn clear(&mut self, background: &[u8; HEIGHT]) {
         for plane in &mut self.planes {
             for (line, &colour) in plane.chunks_exact_mut(STRIDE).zip(background) {
@@ -30,7 +30,7 @@ impl PlanarBuffer {
         }
     }
 
-    /// The colour of pixel (x, y).
+    /// Returns the colour of pixel (x, y).
     ///
     /// # Panics
     /// If the pixel is outside the page.
@@ -47,7 +47,7 @@ impl Default for PlanarBuffer {
 }
 
 impl Destination for PlanarBuffer {
-    /// All planes can be reached at any time.
+    /// Does nothing: all planes can be reached at any time.
     fn select(&mut self, _: u16) {}
 
     #[inline]
@@ -61,9 +61,9 @@ impl Destination for PlanarBuffer {
         check_lane::<STEP>(x, y, len);
         let (x, top) = (usize::from(x), usize::from(y));
         let first = NonNull::from(&mut self.planes).cast::<u8>();
-        // SAFETY: (x, y) is in the picture, so this is a byte of its plane.
+        // SAFETY: (x, y) is in the frame, so this is a byte of its plane.
         let base = unsafe { first.add((x & 3) * PAGE_BYTES + top * STRIDE + x / 4) };
-        // SAFETY: the last pixel is in the picture, too, and `STEP` bytes are a line down or four
+        // SAFETY: the last pixel is in the frame, too, and `STEP` bytes are a line down or four
         // pixels right: the lane lies in the plane from its first byte to its last. The exclusive
         // borrow of the planes lives until `draw` returns.
         draw(unsafe { Lane::new(base, len) });

@@ -1,4 +1,4 @@
-//! A part of a destination that shows another part of the picture.
+//! Windows: a part of a destination that shows another part of the frame.
 
 use core::ops::Range;
 
@@ -6,11 +6,11 @@ use crate::column::check_row;
 use crate::driver::check_lane;
 use crate::{Destination, Lane, STRIDE, WIDTH};
 
-/// Some columns of a picture, shown at other columns of a destination. What is drawn beside them is
-/// left out.
+/// Some columns of a frame, shown at other columns of a destination. Pixels outside these columns
+/// are not drawn.
 ///
-/// It is moved by whole addresses, four columns, so every column keeps its plane: whoever draws by
-/// planes, or selects one for many columns, does not notice.
+/// A window moves columns by whole addresses, four columns each, so every column keeps its plane.
+/// Code that draws by planes, or selects one plane for many columns, works unchanged.
 #[derive(Debug)]
 pub struct Window<'d, D> {
     destination: &'d mut D,
@@ -19,10 +19,11 @@ pub struct Window<'d, D> {
 }
 
 impl<'d, D: Destination> Window<'d, D> {
-    /// Shows the picture's `columns` from column `to` of `destination` on.
+    /// Returns a window that shows the frame's `columns` from column `to` of `destination` on.
     ///
     /// # Panics
-    /// If they leave the picture on either side, or would be moved by other than a multiple of four.
+    /// If the columns leave the frame on either side, or if they would move by a distance that is
+    /// not a multiple of four.
     pub fn new(destination: &'d mut D, columns: Range<u16>, to: u16) -> Self {
         let (width, picture) = (columns.end.saturating_sub(columns.start), WIDTH as u16);
         assert!(
@@ -38,13 +39,13 @@ impl<'d, D: Destination> Window<'d, D> {
         }
     }
 
-    /// Of `len` pixels, `step` columns apart from column `x` on, those that are shown.
+    /// Returns which of `len` pixels, `step` columns apart from column `x` on, are shown.
     fn shown(&self, x: u16, len: u16, step: u16) -> Range<u16> {
         let before = |column: u16| column.saturating_sub(x).div_ceil(step).min(len);
         before(self.columns.start)..before(self.columns.end)
     }
 
-    /// Where a column that is shown lies.
+    /// Returns the destination's column for the shown column `x`.
     fn moved(&self, x: u16) -> u16 {
         x - self.columns.start + self.to
     }
@@ -75,7 +76,8 @@ impl<D: Destination> Destination for Window<'_, D> {
             let x = self.moved(x);
             self.destination.lane(x, y, len, draw);
         } else if !shown.is_empty() {
-            // Whoever draws has to begin at the beginning.
+            // `draw` has to begin at the first pixel, so draw the whole lane into RAM and copy the
+            // part.
             let mut whole = [0; STRIDE];
             draw(Lane::over(&mut whole[..len.into()]));
             let part = &whole[usize::from(shown.start)..usize::from(shown.end)];

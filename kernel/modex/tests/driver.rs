@@ -1,4 +1,4 @@
-//! The driver on a recorder: what it writes, in which order, and what that leaves in the planes.
+//! Runs the driver on a recorder: checks its writes, their order, and the resulting bytes in the planes.
 
 use std::collections::HashMap;
 
@@ -17,8 +17,8 @@ enum Access {
     Load(u16),
 }
 
-/// Remembers every access, and models just enough to read registers back and to look into the
-/// planes. Not a VGA: it checks nothing.
+/// Records every access, and models just enough to read registers back and to inspect the planes. It is not a
+/// VGA: it checks nothing.
 #[derive(Debug)]
 struct Recorder {
     log: Vec<Access>,
@@ -26,20 +26,20 @@ struct Recorder {
     registers: HashMap<(u16, u8), u8>,
     attribute_data: bool,
     planes: Vec<Vec<u8>>,
-    /// What Input Status 1 reads, by turns.
+    /// The values that reads of Input Status 1 return, in turn.
     status: Vec<u8>,
-    /// A register that does not hold what is written.
+    /// A register that does not keep a written value.
     stuck: Option<(u16, u8)>,
     dispi: bool,
-    /// What is behind SR6.
+    /// The device behind SR6.
     sr6: Sr6,
     window: Behind,
 }
 
-/// What is behind SR6 of a card.
+/// What a card has at SR6.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sr6 {
-    /// A Cirrus Logic card's lock: it reads 12h after 12h, and 0Fh after any other value.
+    /// A Cirrus Logic card's lock: it reads 12h after a write of 12h, and 0Fh after any other value.
     Lock,
     /// A register of eight bits.
     Register,
@@ -54,13 +54,13 @@ enum Sr6 {
 enum Behind {
     /// Four planes of 64 KiB.
     Planes,
-    /// RAM: one byte at each address, whatever Map Mask and Read Map say.
+    /// RAM: one byte at each address, whatever Map Mask and Read Map are.
     Ram,
-    /// No device: stores vanish, and loads return this byte.
+    /// No device: stores are lost, and loads return this byte.
     Nothing(u8),
-    /// Four planes of 32 KiB, each of them twice.
+    /// Four planes of 32 KiB, each of which appears twice.
     Half,
-    /// Planes whose stores reach all of them.
+    /// Planes of which every store reaches all.
     Unmasked,
 }
 
@@ -80,7 +80,7 @@ impl Recorder {
         }
     }
 
-    /// Where a byte of the window lies in each plane.
+    /// The offset in each plane of a byte of the window.
     fn place(&self, at: usize) -> usize {
         match self.window {
             Behind::Half => at % (PLANE_BYTES / 2),
@@ -207,7 +207,7 @@ fn the_mode_is_set_in_an_order_that_every_card_takes() {
     let mut recorder = Recorder::new();
     ModeX::set(&mut recorder, &BLACK).unwrap();
     let log = &recorder.log;
-    // DISPI is off before any VGA register is touched.
+    // DISPI is off before any access to a VGA register.
     let dispi_off = position(log, Access::Out16(DISPI_DATA, 0));
     let vga = |a: &Access| matches!(a, Access::Out8(p, _) | Access::Out16(p, _) if *p >= 0x3C0);
     assert!(log.iter().position(vga).unwrap() > dispi_off);
@@ -215,13 +215,13 @@ fn the_mode_is_set_in_an_order_that_every_card_takes() {
     let misc = position(log, Access::Out8(MISC_WRITE, MODE_X.misc));
     assert!(position(log, Access::Out16(SEQUENCER, 0x0100)) < misc);
     assert!(misc < position(log, Access::Out16(SEQUENCER, 0x0300)));
-    // CR0 is written with the protection off, and it is on at the end.
+    // CR0 is written with the protection off, and the protection is on at the end.
     let unprotected = position(log, Access::Out16(CRTC, 0x2C11));
     assert!(unprotected < position(log, Access::Out16(CRTC, 0x5F00)));
     assert_eq!(recorder.registers[&(CRTC, 0x11)], 0xAC);
-    // Attribute registers take no word writes.
+    // Attribute registers accept no word writes.
     assert!(!log.iter().any(|a| matches!(a, Access::Out16(ATTRIBUTE, _))));
-    // The screen is off until all is black, then on.
+    // The screen is off until everything is black, then on.
     let on = position(log, Access::Out16(SEQUENCER, 0x0101));
     let last_store = log.iter().rposition(|a| matches!(a, Access::Store(_)));
     assert!(last_store.unwrap() < on);
@@ -231,7 +231,7 @@ fn the_mode_is_set_in_an_order_that_every_card_takes() {
     }
 }
 
-/// A mode set on a card without DISPI, whose SR6 read `before` until then.
+/// Sets the mode on a card without DISPI whose SR6 read `before` until then.
 fn set_without_dispi(sr6: Sr6, before: u8) -> Recorder {
     let mut recorder = Recorder::new();
     (recorder.dispi, recorder.sr6) = (false, sr6);
@@ -251,8 +251,7 @@ fn a_cirrus_leaves_its_own_linear_mode() {
     }
 }
 
-/// Whatever a card has at SR6 that is no Cirrus: nothing outside the VGA has another value after
-/// the mode set.
+/// Whatever a card that is not a Cirrus has at SR6, the mode set changes nothing outside the VGA.
 #[test]
 fn any_other_card_is_left_as_it_was() {
     let kinds = [Sr6::Register, Sr6::HalfRegister].map(|kind| [(kind, 0x00), (kind, 0x0A)]);
@@ -297,7 +296,7 @@ fn a_window_that_is_not_planar_is_named() {
         actual,
     };
     for (window, expected) in [
-        // The last store at this address is what RAM keeps.
+        // RAM keeps the last store at this address.
         (Behind::Ram, plane(0, 0, 0x51, 0x54)),
         (Behind::Unmasked, plane(0, 0, 0x51, 0x54)),
         (Behind::Nothing(0xFF), plane(0, 0, 0x51, 0xFF)),
@@ -313,7 +312,7 @@ fn a_window_that_is_not_planar_is_named() {
     }
 }
 
-/// The page's planes in the card, as a page in RAM.
+/// A page's planes in the card, as a page in RAM.
 fn page(recorder: &Recorder, page: usize) -> PlanarBuffer {
     let mut buffer = PlanarBuffer::new();
     for (to, from) in buffer.planes.iter_mut().zip(&recorder.planes) {
@@ -342,9 +341,9 @@ fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
         for &(x, y, len, colour) in &columns {
             expected.column(x, y, len, |column| column.fill(|| colour));
         }
-        // Some have an overlay.
+        // Some frames have an overlay.
         let (drawn, over) = columns.split_at(random.usize(0..=columns.len()));
-        // Straight to the card, or in RAM first: a page may be either's in turn.
+        // Directly to the card, or in RAM first: a page may get both kinds in turn.
         let presented = random.bool();
         if presented {
             offscreen.begin(&background);
@@ -387,7 +386,7 @@ fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
             [0, 0x4B, 0x96][shown]
         );
         assert!(page(recorder, shown) == expected, "picture {picture}");
-        // What lies behind the last page belongs to nobody.
+        // The memory after the last page stays untouched.
         assert!(
             recorder
                 .planes
@@ -406,12 +405,12 @@ fn a_page_that_may_be_on_the_screen_is_not_drawn_on() {
         card.begin(&background);
         card.bus().log.clear();
         card.flip();
-        // One write of one byte: the beam's place does not matter.
+        // A single write of one byte: the beam's position does not matter.
         let [Access::Out16(CRTC, flip)] = card.bus().log[..] else {
             panic!("{:?}", card.bus().log);
         };
         assert_eq!(flip.to_le_bytes()[0], START_ADDRESS_HIGH);
-        // The display is seen after the write, and the retrace after that.
+        // The driver sees the display after the write, and then the retrace.
         card.bus().status = vec![
             VERTICAL_RETRACE | DISPLAY_DISABLED,
             VERTICAL_RETRACE | DISPLAY_DISABLED,
@@ -422,8 +421,8 @@ fn a_page_that_may_be_on_the_screen_is_not_drawn_on() {
         card.settle();
         assert_eq!(card.bus().log, [Access::In(INPUT_STATUS_1); 4]);
     }
-    // Three pages: the page after next was on the screen when the last flip was written, so
-    // every second picture waits for a retrace before its first store.
+    // Three pages: the page after next was on the screen when the last flip was written, so every second
+    // frame waits for a retrace before its first store.
     card.bus().status = vec![VERTICAL_RETRACE | DISPLAY_DISABLED, 0];
     card.settle();
     let mut waits = Vec::new();
@@ -467,7 +466,7 @@ fn a_column_beyond_the_page_is_refused() {
     PlanarBuffer::new().column(0, 200, 41, |column| column.fill(|| 0));
 }
 
-/// A row from every plane to every plane, of one pixel, across the picture and at its corners.
+/// Rows from every plane to every plane, rows of one pixel, across the screen and at its corners.
 fn rows() -> impl Iterator<Item = (u16, u16, u16)> {
     let starts = (0..4).flat_map(|x| (1..=9).map(move |len| (x + 36, 7, len)));
     let ends = (1..=9).map(|len| (WIDTH as u16 - len, HEIGHT as u16 - 1, len));
@@ -483,7 +482,7 @@ fn a_row_takes_one_mask_and_one_store_a_pixel() {
         let mut expected = PlanarBuffer::new();
         expected.clear(&background);
         let mut flat = expected;
-        // Pixel by pixel, as a column of one: what a row has to come to.
+        // Pixel by pixel, as columns of one pixel: the expected row.
         for (x, colour) in (x..x + len).zip(100u16..) {
             expected.column(x, y, 1, |pixel| pixel.fill(|| colour as u8));
         }
@@ -515,7 +514,7 @@ fn a_row_takes_one_mask_and_one_store_a_pixel() {
             );
         }
         assert!(page(card.bus().inner(), 1) == expected, "on the card");
-        // It is known to be drawn on: two rounds of pages later nothing of it is left.
+        // The page is recorded as drawn on: after two rounds of pages nothing of it is left.
         for _ in 0..PAGES {
             card.begin(&background);
             card.flip();
@@ -526,7 +525,7 @@ fn a_row_takes_one_mask_and_one_store_a_pixel() {
     }
 }
 
-/// Of a line in RAM the row's pixels are stored, plane by plane, and no other.
+/// From a line in RAM, only the row's pixels are stored, plane by plane.
 #[test]
 fn a_row_of_a_line_takes_a_mask_a_plane_and_one_store_a_pixel() {
     let background = [9; HEIGHT];
@@ -547,7 +546,7 @@ fn a_row_of_a_line_takes_a_mask_a_plane_and_one_store_a_pixel() {
         offscreen.begin(&background);
         offscreen.line(x, y, len, draw);
         assert!(offscreen.page() == &expected, "to be presented");
-        // It is known to be drawn on.
+        // The page is recorded as drawn on.
         offscreen.begin(&background);
         let mut bare = PlanarBuffer::new();
         bare.clear(&background);
@@ -644,13 +643,13 @@ fn every_write_is_counted_once_for_its_purpose() {
         loads: 0,
     };
     assert_eq!(draw, tallies(1, 1, 100, 100));
-    // The first time the whole page, and 8 bytes a store.
+    // The first time the whole page, with 8 bytes a store.
     let page = PAGE_BYTES as u64;
     assert_eq!(erase, tallies(1, 1, page / 8, page));
     assert_eq!(overlay, tallies(1, 1, 10, 10));
     assert_eq!(flip, tallies(1, 0, 0, 0));
-    // The rest is the mode set's: all of the planes are cleared. The proof that they are planes
-    // takes a store and a load of eight bytes, with Map Mask before each store and once at its end.
+    // The rest belongs to the mode set, which clears all of the planes. The proof that they are planes needs
+    // a store and a load of eight bytes, with Map Mask before each store and once at its end.
     let proof = 8;
     let planes = PLANE_BYTES as u64;
     let log = &counted.inner().log;
@@ -665,8 +664,7 @@ fn every_write_is_counted_once_for_its_purpose() {
     assert_eq!(setup, expected);
 }
 
-/// Whatever is drawn, in whatever shape: a window shows what a whole picture has in its columns,
-/// and touches no other.
+/// For any shape, a window shows the columns of the whole frame that lie in it, and touches no others.
 #[test]
 fn a_window_shows_its_columns_and_nothing_else() {
     let mut random = seeded::generator();
@@ -718,7 +716,7 @@ fn a_window_shows_its_columns_and_nothing_else() {
     }
 }
 
-/// Columns keep their planes, and what is not shown costs nothing.
+/// Columns keep their planes, and hidden columns cost nothing.
 #[test]
 fn a_window_on_the_card_selects_and_stores_for_its_columns_alone() {
     let mut card = ModeX::set(Counted::new(Recorder::new()), &BLACK).unwrap();

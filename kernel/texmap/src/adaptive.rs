@@ -1,26 +1,28 @@
 //! Adaptive subdivision: perspective by linear pieces, each as long as an error allows.
 //!
-//! Pieces are linear between the quotients at their ends, as in [`crate::runs`]; but how long one
-//! is depends on where it lies. Far away the texture bends most. So pieces are made from the run's
-//! near end on, and become shorter and shorter; where even the shortest errs too much the rest of
-//! the run is exact.
+//! Pieces are linear between the quotients at their ends, as in [`crate::runs`], but the length of
+//! a piece depends on where it lies. The texture coordinate is most curved far away. So pieces are
+//! made from the span's near end on, and become shorter and shorter. Where even the shortest piece
+//! errs too much, the rest of the span is drawn exactly.
 //!
 //! # How long
 //!
-//! A piece of n pixels keeps to the tolerance where the mean of the depths at its ends is large
-//! enough ([`crate::bounds`]): one multiplication tells, and no quotient has to be found first. If
-//! the whole run keeps to it, it is one piece. Otherwise pieces have the [`LENGTHS`], each the
-//! longest that keeps to it there: none is longer than the one before, since depth falls. What is
-//! left over at the far end may be shorter, and is judged as if it were not.
+//! A piece of n pixels keeps to the tolerance where the geometric mean of the depths at its ends is
+//! large enough ([`crate::bounds`]). One multiplication decides that, before any quotient is
+//! computed. (A depth here is a value of the form c, which is large near the eye.) If the whole
+//! span keeps to the tolerance, it is one piece. Otherwise each piece has the longest of the
+//! [`LENGTHS`] that keeps to the tolerance there. No piece is longer than the piece before it,
+//! since c falls. The last piece at the far end may be shorter, and is judged as if it had its full
+//! length.
 //!
-//! Error: no more than the tolerance, which pays for everything: the chords, their ends (rounded
-//! down, and clamped into the texture), and steps that are cut towards zero. Where a clamp alone is
-//! too much, a piece is one pixel, its own end.
+//! Error: at most the tolerance, which covers everything: the chords, their ends (rounded down, and
+//! clamped into the texture), and the steps, which are cut towards zero. Where a clamp alone
+//! exceeds the tolerance, a piece is a single pixel, which is its own end.
 //!
 //! # Rows
 //!
-//! Lengths are multiples of four, and a row's first piece ends where four pixels do that share an
-//! address. So each of the next has as many pixels in one plane as in another.
+//! Lengths are multiples of four, and a row's first piece ends where a group of four pixels with a
+//! common address ends. So each of the following pieces has equally many pixels in all four planes.
 
 use crate::bounds::{Chords, place};
 use crate::job::Tools;
@@ -30,45 +32,46 @@ use crate::runs::{Reciprocal, between};
 use crate::within::Tolerance;
 use crate::{Texture, affine};
 
-/// Pixels of a piece, the longest first. One of four would take longer than quotients: see
-/// [`PIECE`].
+/// Lengths of pieces in pixels, the longest first. A piece of four would cost more than quotients:
+/// see [`PIECE`].
 pub const LENGTHS: [u16; 11] = [256, 192, 128, 96, 64, 48, 32, 24, 16, 12, 8];
-/// What making a piece takes, in pixels of an affine column.
+/// Cost of making a piece, in pixels of an affine column.
 pub const PIECE: u32 = 26;
-/// What a quotient for a pixel takes, in the same.
+/// Cost of a quotient for a pixel, in pixels of an affine column.
 pub const EXACT: u32 = 7;
 
-/// A piece of a run.
+/// A piece of a span.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Piece {
-    /// The first pixel, counted from the run's first.
+    /// The first pixel, counted from the span's first.
     pub first: u16,
-    /// Pixels, at least 1.
+    /// The number of pixels, at least 1.
     pub len: u16,
-    /// Its walk, from its first pixel on.
+    /// The piece's walk, from its first pixel on.
     pub walk: affine::Walk,
 }
 
-/// What cuts a run into pieces, from its near end on; then [`Pieces::rest`] tells what is left.
+/// Cuts a span into pieces, from its near end on. Then [`Pieces::rest`] returns what is left.
 #[derive(Clone, Copy, Debug)]
 pub struct Pieces {
-    /// From where the next piece begins away from the near end.
+    /// The forms from the start of the next piece on, away from the near end.
     walk: Walk,
-    /// The run's far end is its first pixel.
+    /// Whether the span's far end is its first pixel.
     backward: bool,
-    /// Pixels of the run, and those of them that have their piece.
+    /// Pixels of the span, and the number of them that already have a piece.
     len: u16,
     done: u16,
     chords: Chords,
-    /// Pixels of the next piece, if it keeps to the tolerance.
+    /// Steps of the next piece, if it keeps to the tolerance.
     longest: u16,
-    /// What the product of the depths at its ends must not be less than.
+    /// The least product of the depths at the next piece's ends.
     least: u64,
-    /// Which of [`LENGTHS`] is the next shorter.
+    /// Index of the next shorter of the [`LENGTHS`].
     shorter: usize,
-    /// What the first piece is shorter by than its length.
+    /// Pixels by which the first piece is shorter than its length.
     lead: u16,
-    /// Where the next piece begins: the depth, the coordinates, and what they were clamped by.
+    /// Start of the next piece: its depth, its coordinates, and the amount by which they were
+    /// clamped.
     near: u64,
     here: (i32, i32),
     outside: u32,
@@ -77,8 +80,8 @@ pub struct Pieces {
 }
 
 impl Pieces {
-    /// Cuts the run of `len` pixels, at least 1, along `walk`; a row is told by the x of its first
-    /// pixel.
+    /// Returns the pieces of the span of `len` pixels, at least 1, along `walk`. For a row, `row`
+    /// is the x of its first pixel.
     pub fn new(
         walk: &Walk,
         len: u16,
@@ -115,7 +118,7 @@ impl Pieces {
             outside,
             last,
         };
-        // On the horizon and beyond it no piece begins.
+        // No piece begins on or beyond the horizon.
         if walk.at[2] <= 0 {
             return pieces;
         }
@@ -142,7 +145,7 @@ impl Pieces {
         self.least = self.chords.least(length, 0);
     }
 
-    /// Sets it to the next shorter, if there is one.
+    /// Sets the length of the next piece to the next shorter length, if one exists.
     #[inline]
     fn shorten(&mut self) -> Option<()> {
         let &length = LENGTHS.get(self.shorter)?;
@@ -151,14 +154,14 @@ impl Pieces {
         Some(())
     }
 
-    /// Whether the next piece may end at this depth.
+    /// Returns whether the next piece may end at this depth.
     #[inline]
     fn keeps(&self, depth: i64) -> bool {
         depth > 0 && self.near * self.chords.cut(depth) >= self.least
     }
 
-    /// The steps of the next piece, up to so many, the forms at its end and the coordinates there,
-    /// where one of the ends is clamped.
+    /// Returns the steps of the next piece, at most `steps`, the forms at its end, and the
+    /// coordinates there, for a piece with a clamped end.
     #[cold]
     fn clamped(&self, steps: u16) -> (u16, [i64; 3], ((i32, i32), u32)) {
         let shorter = LENGTHS.into_iter().filter(|&length| length < steps);
@@ -176,8 +179,8 @@ impl Pieces {
         (steps, end, coordinates(end, self.last))
     }
 
-    /// What is left when there is no next piece: its first pixel, its pixels and its walk from the
-    /// first on.
+    /// Returns what is left when no next piece exists: its first pixel, its number of pixels, and
+    /// its walk from that pixel on.
     pub fn rest(&self) -> Option<(u16, u16, Walk)> {
         let len = self.len - self.done;
         if len == 0 {
@@ -194,7 +197,7 @@ impl Pieces {
     }
 }
 
-/// Ends at the run's far end, or where what is left has to be exact.
+/// Ends at the span's far end, or where the rest has to be exact.
 impl Iterator for Pieces {
     type Item = Piece;
 
@@ -228,14 +231,14 @@ impl Iterator for Pieces {
     }
 }
 
-/// The coordinates where the three forms have these values, clamped into the texture, and by how
-/// much; where c is not above zero they are of no use.
+/// Returns the coordinates where the three forms have these values, clamped into the texture, and
+/// the amount by which they were clamped. Where c is not above zero the result is meaningless.
 #[inline(always)]
 fn coordinates([a, b, c]: [i64; 3], last: (i32, i32)) -> ((i32, i32), u32) {
     let c = c.max(1);
     let reciprocal = Reciprocal::new(c);
     let inside = |n: i64, last: i32| {
-        // Without a sign, what is below zero is above every size.
+        // As an unsigned number, a negative form is above every limit.
         (n as u64) < (i64::from((last >> 16) + 1) * c) as u64
     };
     match inside(a, last.0) && inside(b, last.1) {
@@ -244,8 +247,8 @@ fn coordinates([a, b, c]: [i64; 3], last: (i32, i32)) -> ((i32, i32), u32) {
     }
 }
 
-/// A whole run as one piece: of one that is known to keep to the tolerance, unless an end is
-/// clamped.
+/// Returns a whole span as one piece, or nothing if an end is clamped. The span must be known to
+/// keep to the tolerance.
 #[inline]
 pub(crate) fn whole(walk: &Walk, len: u16, texture: &Texture<'_>) -> Option<affine::Walk> {
     let last = texture.last();
@@ -254,7 +257,7 @@ pub(crate) fn whole(walk: &Walk, len: u16, texture: &Texture<'_>) -> Option<affi
     (outside | outside_too == 0).then(|| between(from, to, len - 1))
 }
 
-/// Draws every `STRIDE`th pixel of a run from pixel `first` on.
+/// Draws every `STRIDE`th pixel of a span from pixel `first` on.
 #[inline(always)]
 pub(crate) fn draw<const STRIDE: u16>(
     mut pieces: Pieces,
@@ -263,11 +266,11 @@ pub(crate) fn draw<const STRIDE: u16>(
     tools: &Tools,
     mut places: impl Places,
 ) {
-    // That of the first such pixel that is not before a pixel of the run.
+    // The index of the first drawn pixel that is not before `pixel` of the span.
     let place = |pixel: u16| (pixel + STRIDE - 1 - first) / STRIDE;
     let mut next = pieces.next();
     while let Some(piece) = next {
-        // Asked for before this one is drawn: its division is done meanwhile.
+        // Requested before the current piece is drawn, so that its division overlaps the drawing.
         next = pieces.next();
         let (from, to) = (place(piece.first), place(piece.first + piece.len));
         if from < to {

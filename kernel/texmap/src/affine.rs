@@ -1,14 +1,14 @@
 //! The affine column mapper: texture coordinates stepped down the column in 16.16.
 //!
-//! [`Sides`] has the coordinates along a polygon's sides, and makes the walk down a run: exactly
-//! between the two crossings, or by chapter 57's half steps. For a triangle that is one affine map:
-//! where it is moderate, [`Map`] has it, and its walks at a fraction of the cost. [`column()`] draws
-//! one.
+//! [`Sides`] has the coordinates along a polygon's sides, and makes the walk down a span: exactly
+//! between the two crossings, or by chapter 57's half steps. In a triangle the coordinates are one
+//! affine map of the screen. Where that map is within its legal range, [`Map`] holds it and makes
+//! walks at a fraction of the cost. [`column()`] draws a walk.
 //!
-//! Legal input of the mapper: a walk as these make it (inside the texture). Error against the exact
+//! Legal input of the mapper: a walk as made here, inside the texture. Error against the exact
 //! affine coordinates: the step is cut to 2^-16 texel towards zero, so after n pixels the
-//! coordinate is off by less than n 2^-16 texel, at most 0.0037 over 240. The half steps are
-//! another rule: see [`Sides::half_step`].
+//! coordinate is off by less than n 2^-16 texel, at most 0.0037 texel over 240 pixels. The half
+//! steps follow a different rule: see [`Sides::half_step`].
 
 use modex::{Column, HEIGHT, WIDTH};
 
@@ -24,14 +24,14 @@ struct Side {
 }
 
 impl Side {
-    /// The side from `a` to `b` in either order, at the lines that go along `axis`; of one that
-    /// crosses none nobody asks.
+    /// Returns the side between `a` and `b`, given in either order, at the lines that go along
+    /// `axis`. A side that crosses no line gets a default value, which nothing reads.
     fn new(a: &Vertex, b: &Vertex, axis: Axis) -> Self {
         let (across, lines): (fn(&Vertex) -> i32, _) = match axis {
             Axis::Down => (|vertex| vertex.x, WIDTH),
             Axis::Right => (|vertex| vertex.y, HEIGHT),
         };
-        // Always forward: neighbours walk a shared edge with the same bits.
+        // Always forward, so that neighbours step along a shared edge with the same bits.
         let (a, b) = if across(a) <= across(b) {
             (a, b)
         } else {
@@ -51,16 +51,16 @@ impl Side {
     }
 }
 
-/// A walk through the texture, 16.16.
+/// A walk through the texture along a span, 16.16: coordinates at the first pixel, and their steps.
 ///
-/// For every pixel i of its run, `u + i du` and `v + i dv` lie inside the texture: the two end
-/// values were clamped into it and the steps are cut towards zero, so nothing between can leave
-/// it. The mapper does not clamp.
+/// For every pixel i of its span, `u + i du` and `v + i dv` lie inside the texture: both end values
+/// were clamped into the texture and the steps are cut towards zero, so nothing between the ends
+/// can leave it. The mapper does not clamp.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Walk {
-    /// Across the texture, at the first pixel's centre.
+    /// Coordinate across the texture, at the first pixel's centre.
     pub u: i32,
-    /// Down the texture, at the first pixel's centre.
+    /// Coordinate down the texture, at the first pixel's centre.
     pub v: i32,
     /// Step of `u` from a pixel to the next.
     pub du: i32,
@@ -69,7 +69,7 @@ pub struct Walk {
 }
 
 impl Walk {
-    /// The walk from pixel `pixels` of this one on, in steps of `stride` pixels.
+    /// Returns the walk that starts at pixel `pixels` of this walk and steps by `stride` pixels.
     pub fn every(&self, stride: i32, pixels: i32) -> Self {
         let Self { u, v, du, dv } = *self;
         Self {
@@ -81,13 +81,13 @@ impl Walk {
     }
 }
 
-/// The coordinates, pixel after pixel.
+/// Yields the coordinates, pixel after pixel.
 impl Iterator for Walk {
     type Item = (i32, i32);
 
     fn next(&mut self) -> Option<(i32, i32)> {
         let here = (self.u, self.v);
-        // The last addition steps past the run; |u| and |du| are below 2^25, so it fits.
+        // The last addition steps past the span; |u| and |du| are below 2^25, so it fits.
         self.u += self.du;
         self.v += self.dv;
         Some(here)
@@ -103,10 +103,11 @@ pub struct Sides {
 }
 
 impl Sides {
-    /// Those of `polygon` in `texture`, at the lines that go along `axis`.
+    /// Returns the coordinates along the sides of `polygon` in `texture`, at the lines that go
+    /// along `axis`.
     ///
     /// # Errors
-    /// A polygon outside the legal range, or coordinates outside the texture.
+    /// If the polygon is outside the legal range, or its coordinates are outside the texture.
     pub fn new(polygon: &[Vertex], texture: &Texture<'_>, axis: Axis) -> Result<Self, Dropped> {
         coverage::check(polygon)?;
         let (width, height) = (texture.width(), texture.height());
@@ -127,16 +128,16 @@ impl Sides {
         })
     }
 
-    /// The walk along a run of [`coverage::runs`] on the same axis.
+    /// Returns the walk along a span of [`coverage::runs`] on the same axis.
     ///
-    /// The coordinates at the first and the last pixel's centre are interpolated between the two
-    /// crossings, then clamped into the texture; the step between them is cut towards zero.
+    /// The coordinates at the centres of the first and the last pixel are interpolated between the
+    /// two crossings, then clamped into the texture. The step between them is cut towards zero.
     pub fn walk(&self, run: &Run) -> Walk {
         let [top, bottom] = run.between;
         // 24 fraction bits of height keep 2^-8 texel even where a whole texture is squeezed into
-        // 1/256 pixel. A height below 2^9 pixels then has at most 33 bits and its product with a
-        // difference of coordinates (28 bits with 20 of fraction) fits; taller ones are scaled
-        // down.
+        // 1/256 pixel. A height below 2^9 pixels then has at most 33 bits, and its product with a
+        // difference of coordinates (28 bits, 20 of them fraction) fits 64. Taller heights are
+        // scaled down.
         let mut height = (bottom.at - top.at) >> 8;
         let offset = |row: i64| (((row << 32) + (1 << 31)) - top.at) >> 8;
         let (first, len) = (i64::from(run.first), i64::from(run.len));
@@ -159,7 +160,7 @@ impl Sides {
             at(|s| &s.v, start, self.last.1),
         );
         let (mut du, mut dv) = (0, 0);
-        // A column of one pixel has no step; dividing by len - 1 all the same was the seeds' trap.
+        // A span of one pixel has no step; len - 1 would divide by zero.
         if run.len > 1 {
             let steps = i32::from(run.len) - 1;
             du = (at(|s| &s.u, stop, self.last.0) - u) / steps;
@@ -168,24 +169,25 @@ impl Sides {
         Walk { u, v, du, dv }
     }
 
-    /// The walk by chapter 57's rule, translated to texels that begin at whole numbers.
+    /// Returns the walk by chapter 57's rule, translated to texels that begin at whole numbers.
     ///
-    /// It knows pixels, not where in them the crossings lie: the coordinates of the two crossings
-    /// are shared out over the n pixels between them in n equal steps, and the first pixel stands
-    /// half a step in.
+    /// The rule knows pixels, but not where in these pixels the crossings lie. It divides the
+    /// difference between the coordinates at the two crossings into n equal steps for the n pixels
+    /// between the crossings, and puts the first pixel half a step in.
     ///
-    /// Error against the exact affine coordinates: half a pixel's worth of texture along the run.
-    /// For let the crossings be h pixels apart, the first centre f past the one and the last centre
-    /// g before the other: n - 1 + f + g = h, with f and g from 0 to 1. Pixel i is given what
-    /// belongs (i + 1/2) h/n past the first crossing, and its centre is i + f past it. The
-    /// difference is (1 - t) (1/2 - f) + t (g - 1/2) with t = (i + 1/2)/n: between the two, so
-    /// never above 1/2, and 1/2 along the whole run where f = 0 and g = 1. The step is cut to 2^-16
-    /// texel towards zero besides, as in [`Sides::walk`].
+    /// Error against the exact affine coordinates: at most half a pixel's worth of texture along
+    /// the span. Proof: let the crossings be h pixels apart, let the first centre lie f past the
+    /// first crossing, and let the last centre lie g before the second. Then n - 1 + f + g = h,
+    /// with f and g from 0 to 1. Pixel i gets the coordinate that belongs (i + 1/2) h/n past the
+    /// first crossing, and its centre lies i + f past that crossing. With t = (i + 1/2)/n the
+    /// difference is (1 - t) (1/2 - f) + t (g - 1/2). This lies between 1/2 - f and g - 1/2, so its
+    /// magnitude is never above 1/2; it is 1/2 along the whole span where f = 0 and g = 1. In
+    /// addition the step is cut to 2^-16 texel towards zero, as in [`Sides::walk`].
     pub fn half_step(&self, run: &Run) -> Walk {
         // The first pixel whose centre is not above a crossing, on the screen or off it.
         let cell = |at: i64| (at + (1 << 31) - 1) >> 32;
         let [top, bottom] = run.between.map(|end| cell(end.at));
-        // Crossings are off by 2^-23: they may be told on the wrong side of a centre.
+        // A crossing is off by up to 2^-23 and may appear on the wrong side of a centre.
         let before = (i64::from(run.first) - top).max(0);
         let steps = (bottom - top).max(before + i64::from(run.len));
         let [u, v] = [
@@ -195,7 +197,8 @@ impl Sides {
         .map(|[(from, last), (to, _)]| {
             let [from, to] = [from, to].map(|end| (end >> 16).clamp(0, i64::from(last) + 1));
             let step = (to - from) / steps;
-            // Not from the cut step: what it lost would add up over pixels that nobody sees.
+            // Computed from the full difference: the part that the step loses would add up over the
+            // pixels before the screen.
             let first = from + (to - from) * (2 * before + 1) / (2 * steps);
             (first.min(i64::from(last)) as i32, step as i32)
         });
@@ -207,50 +210,52 @@ impl Sides {
         }
     }
 
-    /// A coordinate where the run's column enters the polygon and where it leaves it.
+    /// Returns a coordinate where the span's line enters the polygon and where it leaves it.
     fn ends(&self, run: &Run, along: fn(&Side) -> &Along) -> [i64; 2] {
         let line = i32::from(run.line);
         run.between.map(|end| along(&self.sides[end.side]).at(line))
     }
 }
 
-/// The one affine map of a triangle: both gradients once, and then no division in a run unless it
-/// is cut at the texture's border.
+/// The single affine map of a triangle: both gradients are computed once, and a span needs no
+/// division unless it is cut at the texture's border.
 ///
-/// Legal input: three corners that lie within [`Map::REACH`] of the screen's middle in x and in y,
-/// in the texture or on its border, and less than 256 texels a pixel across and down the screen.
-/// Of others there is none, and [`Sides`] has their walks.
+/// Legal input: three corners within [`Map::REACH`] of the screen's middle in x and in y, in the
+/// texture or on its border, with less than 256 texels per pixel across and down the screen. Other
+/// polygons have no map; [`Sides`] makes their walks.
 ///
 /// Error against the exact affine coordinates: less than 3 2^-16 texel at the first pixel (see
-/// [`Map::new`]; it is rounded down besides), and after n pixels less than n 2^-16 more, the step
-/// being cut towards zero.
+/// [`Map::new`]; this includes rounding down), and less than another n 2^-16 texel after n pixels,
+/// because the step is cut towards zero.
 #[derive(Clone, Copy, Debug)]
 pub struct Map {
     u: Gradient,
     v: Gradient,
     /// The last coordinate inside the texture, across and down.
     last: (i32, i32),
-    /// Whether no corner is so near the texture's border that rounding could lead out of it.
+    /// Whether every corner is far enough from the texture's border that rounding cannot lead out
+    /// of it.
     inside: bool,
 }
 
-/// A coordinate that is linear on the screen; 32 fraction bits, steps within +-2^40.
+/// A coordinate that is linear on the screen: 32 fraction bits, steps within +-2^40.
 #[derive(Clone, Copy, Debug)]
 struct Gradient {
-    /// At the centre of pixel (0, 0): below 2^52.
+    /// Value at the centre of pixel (0, 0): below 2^52.
     origin: i64,
     right: i64,
     down: i64,
-    /// `down` as a walk has it: 16 fraction bits, cut towards zero.
+    /// `down` as the step of a walk: 16 fraction bits, cut towards zero.
     step: i32,
 }
 
 impl Map {
-    /// How far a corner may be from the screen's middle in either direction: 512 pixels, in 1/256
-    /// pixel.
+    /// Largest distance of a corner from the screen's middle in either direction: 512 pixels, in
+    /// 1/256 pixel.
     pub const REACH: i32 = 512 * 256;
 
-    /// That of `polygon` in `texture`, if it has one in the legal range.
+    /// Returns the map of `polygon` in `texture`, or nothing if the polygon is outside the legal
+    /// range.
     #[inline]
     pub fn new(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Self> {
         let [a, b, c] = polygon else {
@@ -270,8 +275,9 @@ impl Map {
         if !(legal(a) && legal(b) && legal(c)) {
             return None;
         }
-        // Differences of places are at most 2^18, of coordinates 2^24. Three points lie in a box:
-        // what they span is no larger than it, 2^36, and 2^42 with a coordinate for a side.
+        // Differences of positions are at most 2^18, and of coordinates 2^24. Three points lie in a
+        // box, and the parallelogram that they span is no larger than the box: 2^36 with two
+        // positions, and 2^42 with a coordinate for one side.
         let spanned = |p: (i32, i32), q: (i32, i32)| {
             i64::from(p.0) * i64::from(q.1) - i64::from(p.1) * i64::from(q.0)
         };
@@ -280,9 +286,10 @@ impl Map {
         if area == 0 {
             return None;
         }
-        // One division. Off by less than 1, it moves a gradient by less than 2^42 2^-38, 2^-28
-        // texel a pixel, and over 2^10 pixels each way a coordinate by 2^-17; the gradients' own
-        // last places and the origin's are less than another 2^-20.
+        // One division. `over` is off by less than 1, which moves a gradient by less than 2^42
+        // 2^-38 of its units, that is 2^-28 texel per pixel, and a coordinate by 2^-17 texel over
+        // 2^10 pixels each way. The last places of the gradients and of the origin add less than
+        // another 2^-20.
         let over = (1 << 62) / area;
         let gradient = |at: [i32; 3]| {
             let change = (at[1] - at[0], at[2] - at[0]);
@@ -300,7 +307,8 @@ impl Map {
                 step: (down / (1 << 16)) as i32,
             })
         };
-        // 3 2^-16 texel at the first pixel; the step, cut towards zero, leads no further out.
+        // A coordinate is off by 3 2^-16 texel at the first pixel. The step, which is cut towards
+        // zero, leads no further out.
         let clear = |at: [i32; 3], last: i32| at.iter().all(|at| (4..last - 4).contains(at));
         let (u, v) = ([a.u, b.u, c.u], [a.v, b.v, c.v]);
         Some(Self {
@@ -311,9 +319,9 @@ impl Map {
         })
     }
 
-    /// The map with these values at the centre of pixel (0, 0), and these steps to the right and
-    /// down; 32 fraction bits, steps within +-2^40. `inside` tells that no pixel is as near the
-    /// texture's border as 4 2^-16 texel.
+    /// Returns the map with these values at the centre of pixel (0, 0) and these steps to the right
+    /// and down; 32 fraction bits, steps within +-2^40. `inside` states that no pixel is within 4
+    /// 2^-16 texel of the texture's border.
     pub(crate) fn of(maps: [(i64, i64, i64); 2], texture: &Texture<'_>, inside: bool) -> Self {
         let [u, v] = maps.map(|(origin, right, down)| Gradient {
             origin,
@@ -329,10 +337,10 @@ impl Map {
         }
     }
 
-    /// The walk down a run of [`coverage::spans`] or [`coverage::columns`].
+    /// Returns the walk down a span of [`coverage::spans`] or [`coverage::columns`].
     ///
-    /// Where the first or the last pixel comes to lie outside the texture, which only rounding and
-    /// the far border bring about, both are clamped into it, and the step is what lies between.
+    /// If the first or the last pixel lies outside the texture, which only rounding and the far
+    /// border cause, both are clamped into it, and the step is computed from the clamped ends.
     #[inline]
     pub fn walk<End>(&self, run: &Run<End>) -> Walk {
         let (x, y) = (i64::from(run.line), i64::from(run.first));
@@ -344,7 +352,7 @@ impl Map {
                 return (start as i32, along.step);
             }
             let stop = start + steps * i64::from(along.step);
-            // Without a sign, what is below zero is above every size.
+            // As an unsigned number, a negative coordinate is above every size.
             let inside = |at: i64| at as u64 <= last as u64;
             if inside(start) && inside(stop) {
                 return (start as i32, along.step);
@@ -352,7 +360,7 @@ impl Map {
             let clamped = |at: i64| at.clamp(0, last.into()) as i32;
             let start = clamped(start);
             let stop = clamped((first + steps * along.down) >> 16);
-            // A run of one pixel has no step.
+            // A span of one pixel has no step.
             (start, (stop - start) / (steps as i32).max(1))
         };
         let (u, du) = walk(&self.u, self.last.0);
@@ -361,8 +369,8 @@ impl Map {
     }
 }
 
-/// Draws one column, the texel's index multiplied out for each pixel: the clear twin of
-/// [`crate::loops`].
+/// Draws one column and computes the texel's index from scratch for each pixel: the reference
+/// implementation of [`crate::loops`].
 #[inline]
 pub fn column(texture: &Texture<'_>, mut walk: Walk, column: Column<'_>) {
     column.fill(|| {

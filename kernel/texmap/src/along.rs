@@ -1,10 +1,10 @@
-//! What is linear along a side of a polygon.
+//! Edge interpolants: quantities that are linear along a side of a polygon.
 
-/// A quantity that is linear along a side, at the centres of the lines (columns or rows) that
-/// the side crosses; 32 fraction bits.
+/// A quantity that is linear along a side, at the centres of the lines (columns or rows) that the
+/// side crosses; 32 fraction bits.
 ///
-/// It is off by less than a step's last bit for every line since the first: over 320 lines by
-/// less than 2^-23.
+/// Its error is below one unit in the last place of the step for every line since the first: below
+/// 2^-23 over 320 lines.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Along {
     first: i32,
@@ -13,9 +13,10 @@ pub(crate) struct Along {
 }
 
 impl Along {
-    /// From `a` at 0 to `a + delta` at `length`; line `first` has its centre at `offset`, and the
-    /// next ones follow 256 apart. `shift` more fraction bits make 32 of the input's. |a|,
-    /// |delta|, length and offset are below 2^25, shift is at most 24.
+    /// Returns the quantity that runs from `a` at 0 to `a + delta` at `length`. The centre of line
+    /// `first` is at `offset`, and the centres of the next lines follow 256 apart. `shift` fraction
+    /// bits are added to those of the input, to make 32. |a|, |delta|, length and offset are below
+    /// 2^25, and shift is at most 24.
     pub(crate) fn new(
         a: i32,
         delta: i64,
@@ -31,13 +32,14 @@ impl Along {
         }
     }
 
-    /// The value at the centre of `line`, one that the side crosses.
+    /// Returns the value at the centre of `line`, which the side must cross.
     pub(crate) fn at(&self, line: i32) -> i64 {
         self.value + self.step * i64::from(line - self.first)
     }
 }
 
-/// floor(n 2^shift / d) without the product: n < 2^50, d < 2^25, shift <= 24.
+/// Returns floor(n 2^shift / d) without forming n 2^shift, which could overflow: n < 2^50, d <
+/// 2^25, shift <= 24.
 fn ratio(n: i64, d: i64, shift: u32) -> i64 {
     (n.div_euclid(d) << shift) + (n.rem_euclid(d) << shift) / d
 }

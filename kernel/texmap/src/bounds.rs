@@ -1,62 +1,70 @@
-//! How far the approximations may be from the quotients: closed forms, in integers, rounded up.
+//! Error bounds of the perspective approximations against the exact quotients: closed forms, in
+//! integers, rounded up.
 //!
-//! Along a run a coordinate is f = n / c, with n and c linear in the pixel. Its slope is -D / c^2
-//! with D = n0 c1 - n1 c0 (the values at a pixel and the steps), and D is the same at every pixel
-//! of the run: one number says how fast the texture passes, and c how that changes. c is large near
-//! the eye. Everything happens at the end where it is small, the far one.
+//! Along a span, a texture coordinate is f = a / c, where a and c are linear in the pixel and
+//! change by a' and c' per pixel. (b / c is treated alike.) The slope of f is -D / c^2 with
+//! D = a c' - a' c, and D is the same at every pixel of the span. So one number, D, says how fast
+//! the texture coordinate changes, and c says how that speed varies. c is an inverse depth, so it
+//! is large near the eye: the worst error is always at the end where c is small, the far end.
 //!
 //! # Linear
 //!
-//! Between exact ends over n pixels the worst error is |du| (sqrt r - 1) / (sqrt r + 1), r the
-//! ratio of the end depths: f is 1 / c but for a factor and a sum, and 1 / c less its chord is
-//! largest where c is the geometric mean of the ends. With c at the far end, p = |D| / c^2 (texels
-//! a pixel there), x = n |c1| / c and r = 1 + x it is
+//! Let a chord join exact values of f over n pixels, and let r be the ratio of the depths at its
+//! two ends. The worst error is |du| (sqrt r - 1) / (sqrt r + 1), where du is the change of f
+//! between the ends: f is 1 / c times a constant plus a constant, and the difference of 1 / c and
+//! its chord is largest where c is the geometric mean of the ends. Now let c be its value at the
+//! far end, p = |D| / c^2 the texels per pixel there, and x = n |c'| / c, so that r = 1 + x and
+//! |du| = p n / (1 + x). The error is
 //!
 //! ```text
 //! p n x / ((1 + x) (1 + sqrt(1 + x))^2)
 //! ```
 //!
-//! which falls as c grows: of the pieces of a run the one at its far end is the worst, and is what
-//! a bound of the run takes, as long as the run's longest.
+//! It falls as c grows. So of all pieces of a span the worst is a piece at the span's far end, and
+//! the bound of a span is that of its longest piece, placed at the far end.
 //!
 //! # Quadratic
 //!
-//! Through the ends and the middle it is |du| r / (r - 1) max |(z - 1) (z - m) (z - r)| / (z m r)
-//! over z from 1 to r, m = (1 + r) / 2. With z = 1 + s x that is
+//! Through the two ends and the middle, the worst error is
+//! |du| r / (r - 1) max |(z - 1) (z - m) (z - r)| / (z m r) over z from 1 to r, where m = (1 + r)
+//! / 2. With z = 1 + s x that is
 //!
 //! ```text
 //! p n x^2 max s (1/2 - s) (1 - s) / ((1 + s x) (1 + x / 2) (1 + x)),  s from 0 to 1/2
 //! ```
 //!
-//! (the other half of s has the same numerators and larger denominators). It is near p n x^2 / 20.8
-//! for small x, and never above: the familiar |du| ln(r)^2 / 20.8 is no bound, for du is measured
-//! between the ends and p at the far one.
+//! (the other half of s has the same numerators and larger denominators). For small x this is close
+//! to p n x^2 / 20.8, and it is never above that. The familiar |du| ln(r)^2 / 20.8 is not a bound,
+//! because du is measured between the ends and p at the far end.
 //!
-//! Both factors that depend on x alone are taken from tables of 1/64 up to 1 and of 16 parts of
-//! every power of two from there, each with its value at the part's lower end: too large by 3 % at
-//! most below 1, and above by 13 %, and 20 % for the quadratic's.
+//! Both formulas contain a factor that depends on x alone. These factors come from tables with 64
+//! parts below x = 1 and 16 parts in every power of two from there; each part holds the value at
+//! its lower end. The tables are too large by at most 3 % below 1, and above 1 by at most 13 %
+//! (linear) and 20 % (quadratic).
 //!
 //! # Chords of any length
 //!
-//! With c and d the depths at its ends the linear error is |D c'| n^2 / (c d (sqrt c + sqrt d)^2),
-//! and a sum is no less than twice the geometric mean: it is never above
+//! With c and d the values of the form c at a chord's two ends, the linear error is
+//! |D c'| n^2 / (c d (sqrt c + sqrt d)^2). A sum is at least twice the geometric mean, so the error
+//! is never above
 //!
 //! ```text
 //! |D c'| n^2 / (4 (c d)^(3/2))
 //! ```
 //!
-//! which is too large by 3 % where one depth is twice the other. That is at most T where the mean
-//! depth sqrt(c d) is at least R n^(2/3), with R^3 = |D c'| / (4 T): R is one number for a run, or
-//! for many, and tells of every place how long a chord may be there (`Chords`).
+//! which is too large by 3 % where c is twice d. It is at most a tolerance T where the geometric
+//! mean sqrt(c d) is at least R n^(2/3), with R^3 = |D c'| / (4 T). R is one number for a whole
+//! span, or for many spans, and gives the permitted length of a chord at every place (`Chords`).
 //!
 //! # What is rounded, and what is clamped
 //!
-//! Quotients are cut by less than 1 + 3/128 units of 2^-16 texel, and a linear step by less than
-//! one for every pixel. Ends outside the texture are clamped: cutting a monotone f off at a level
-//! moves a chord by at most what is cut off at its ends, and a quadratic by 5/4 of that, the most
-//! that the three weights sum up to. Nor can the error be more than what the coordinate changes by
-//! over the whole run, for both it and what stands for it are monotone in every piece. On and
-//! beyond the horizon that holds no more, and the bound is the size of the texture.
+//! Rounding down moves a quotient by less than 1 + 3/128 units of 2^-16 texel, and a linear step by
+//! less than one unit for every pixel. Ends outside the texture are clamped. Clamping a monotone f
+//! at a level moves a chord by at most the amount clamped at its ends, and a quadratic by at most
+//! 5/4 of that, the largest sum of the magnitudes of its three weights. Nor can the error exceed
+//! the coordinate's change over the whole span, because the coordinate and its approximation are
+//! both monotone in every piece. On and beyond the horizon that argument fails, and the bound is
+//! the size of the texture.
 
 use crate::coverage::Run;
 use crate::plane::{Plane, Walk};
@@ -65,13 +73,14 @@ use crate::{Texture, Vertex};
 
 /// Parts of the tables below x = 1.
 const FINE: usize = 64;
-/// Powers of two above 1, in 16 parts each.
+/// Powers of two above x = 1, with 16 parts each.
 const OCTAVES: usize = 13;
 const PARTS: usize = FINE + 16 * OCTAVES;
-/// x from which on there is no part, 32 fraction bits: a depth ratio of 8193 in one piece.
+/// End of the tables: the first x without a part, 32 fraction bits. One piece has a depth ratio of
+/// 8193 there.
 const END: u64 = 1 << (32 + OCTAVES);
 
-/// 64 x at the lower end of a part.
+/// Returns 64 x at the lower end of a part.
 const fn lower_end(part: usize) -> u64 {
     if part < FINE {
         return part as u64;
@@ -80,7 +89,7 @@ const fn lower_end(part: usize) -> u64 {
     ((16 + of) as u64) << octave << 2
 }
 
-/// The part that `x` lies in; below [`END`], 32 fraction bits.
+/// Returns the part that contains `x`; `x` has 32 fraction bits and is below [`END`].
 fn part(x: u64) -> usize {
     if x < 1 << 32 {
         return (x >> 26) as usize;
@@ -89,12 +98,12 @@ fn part(x: u64) -> usize {
     FINE + 16 * octave as usize + ((x >> (octave + 28)) & 15) as usize
 }
 
-/// 1 / ((1 + x) (1 + sqrt(1 + x))^2), 60 fraction bits, rounded up.
+/// 1 / ((1 + x) (1 + sqrt(1 + x))^2) for each part, 60 fraction bits, rounded up.
 const LINEAR: [u64; PARTS] = {
     let mut table = [0; PARTS];
     let mut part = 0;
     while part < PARTS {
-        // 1 + x in 64ths, and 2^24 its root, rounded down.
+        // `ratio` is 1 + x in 64ths; `root` is 1 + sqrt(1 + x) with 24 fraction bits, rounded down.
         let ratio = lower_end(part) + 64;
         let root = (ratio << 42).isqrt() + (1 << 24);
         let under = ratio as u128 * root as u128 * root as u128;
@@ -104,15 +113,15 @@ const LINEAR: [u64; PARTS] = {
     table
 };
 
-/// The greatest s (1/2 - s) (1 - s) / ((1 + s x) (1 + x / 2) (1 + x)), 60 fraction bits, rounded
-/// up.
+/// The maximum over s of s (1/2 - s) (1 - s) / ((1 + s x) (1 + x / 2) (1 + x)) for each part, 60
+/// fraction bits, rounded up.
 const QUADRATIC: [u64; PARTS] = {
     let mut table = [0; PARTS];
     let mut part = 0;
     while part < PARTS {
         let x = lower_end(part) as u128;
-        // Narrowed to a thousandth of a thousandth: around its top the function is flat, and less
-        // than 2^-38 of it is missed. A last place of 2^-36 makes up for that.
+        // The search narrows s to 2^-19, about two millionths. The function is flat around its
+        // maximum, so this misses less than 2^-38 of it; adding 2^-36 of it makes up for that.
         let (mut low, mut high) = (0, 1 << 19);
         while high - low > 2 {
             let third = (high - low) / 3;
@@ -129,30 +138,31 @@ const QUADRATIC: [u64; PARTS] = {
     table
 };
 
-/// That function at s / 2^20 and x / 64, 60 fraction bits.
+/// Returns the function of [`QUADRATIC`] at s / 2^20 and x / 64, 60 fraction bits.
 const fn lobe(s: u128, x: u128) -> u128 {
     let over = s * ((1 << 19) - s) * ((1 << 20) - s);
     (over << 39) / (((1 << 26) + s * x) * (128 + x) * (64 + x))
 }
 
-/// What the errors of a run depend on.
+/// The quantities that the error of a span depends on.
 #[derive(Clone, Copy, Debug)]
 pub struct Bend {
-    /// The coordinates of the run's two ends, as [`crate::runs::quotients`] gives them.
+    /// Coordinates at the span's two ends, as [`crate::runs::quotients`] returns them.
     pub ends: [(i32, i32); 2],
     steps: u16,
-    /// p: the larger coordinate's texels a pixel at the far end, 32 fraction bits, rounded up.
+    /// p: the change of the faster coordinate at the far end, in texels per pixel; 32 fraction
+    /// bits, rounded up.
     pace: u64,
-    /// What c changes by in a pixel, against c at the far end, 32 fraction bits, rounded up.
+    /// |c'| / c at the far end: the relative change of c per pixel; 32 fraction bits, rounded up.
     lean: u64,
-    /// The most that an end is outside the texture, 2^-16 texel.
+    /// The farthest that an end lies outside the texture, in units of 2^-16 texel.
     outside: u32,
-    /// What no error is above, 2^-16 texel.
+    /// An upper limit of every error, in units of 2^-16 texel.
     most: u32,
 }
 
 impl Bend {
-    /// That of the run of `len` pixels, at least 1, along `walk`.
+    /// Returns the quantities of the span of `len` pixels, at least 1, along `walk`.
     pub fn new(walk: &Walk, len: u16, texture: &Texture<'_>) -> Self {
         let last = texture.last();
         let steps = len - 1;
@@ -185,7 +195,7 @@ impl Bend {
         bend
     }
 
-    /// The worst error of a coordinate with linear [`Pieces`], in units of 2^-16 texel.
+    /// Returns a bound of a coordinate's error with linear [`Pieces`], in units of 2^-16 texel.
     pub fn linear(&self, pieces: Pieces) -> u32 {
         let steps = pieces.longest(self.steps);
         let error = self.chord(2 * u64::from(steps));
@@ -193,11 +203,13 @@ impl Bend {
         error.min(self.most.into()) as u32
     }
 
-    /// The worst error of a coordinate with quadratic [`Pieces`], in units of 2^-16 texel.
+    /// Returns a bound of a coordinate's error with quadratic [`Pieces`], in units of 2^-16 texel.
     ///
-    /// Where the depth ratio of the longest piece is below 5/2, |K| is at most 6/7 |d|: only what
-    /// rounds the three quotients can make a piece turn, when d is below 36 units, and then the two
-    /// halves are off by 2 more at most.
+    /// A piece that turns is drawn as two chords, so this bound covers them too (see
+    /// [`crate::runs`] for turning pieces, d and K). Where the depth ratio of the longest piece is
+    /// below 5/2, |K| is at most 6/7 |d|. Then only the rounding of the three quotients can make a
+    /// piece turn, and only when |d| is below 36 units; the two halves then are off by at most 2
+    /// units more.
     pub fn quadratic(&self, pieces: Pieces) -> u32 {
         let steps = u64::from(pieces.longest(self.steps));
         let mut error = self.curve(steps);
@@ -208,27 +220,28 @@ impl Bend {
         error.min(self.most.into()) as u32
     }
 
-    /// Steps from the first pixel to the last.
+    /// Returns the number of steps from the first pixel to the last.
     pub(crate) fn steps(&self) -> u16 {
         self.steps
     }
 
-    /// Less than the error of one chord over the whole run, not counting fixed point: with pieces
-    /// of n of its steps it is at least n^2 / steps^2 of this.
+    /// Returns a lower bound of the error of a single chord over the whole span, not counting fixed
+    /// point. A chord over n of the span's steps at the far end has at least n^2 / steps^2 of this
+    /// error.
     ///
-    /// For p n x / (..) is n^2 times a falling function of n, and the table is too large by 13 % at
-    /// most.
+    /// That follows because p n x / (...) is n^2 times a falling function of n. The table is too
+    /// large by at most 13 %, which the factor 7/8 removes.
     pub(crate) fn chord_at_least(&self) -> u64 {
         (self.chord(2 * u64::from(self.steps)) / 8 * 7).saturating_sub(2)
     }
 
-    /// The closed form for a chord over so many half pixels at the far end.
+    /// Returns the closed form for a chord over `halves` half pixels at the far end.
     fn chord(&self, halves: u64) -> u64 {
         let x = (self.lean.saturating_mul(halves)).div_ceil(2);
         self.times(halves, x, |x, part| (x * u128::from(LINEAR[part])) >> 52)
     }
 
-    /// The closed form for a quadratic over so many pixels at the far end.
+    /// Returns the closed form for a quadratic over `steps` pixels at the far end.
     fn curve(&self, steps: u64) -> u64 {
         let x = self.lean.saturating_mul(steps);
         self.times(2 * steps, x, |x, part| {
@@ -236,12 +249,13 @@ impl Bend {
         })
     }
 
-    /// p n times a factor of x with 40 fraction bits, in units of 2^-16 texel, rounded up.
+    /// Returns p n times a factor of x that has 40 fraction bits, in units of 2^-16 texel, rounded
+    /// up.
     fn times(&self, halves: u64, x: u64, factor: impl Fn(u128, usize) -> u128) -> u64 {
         if x >= END {
             return u32::MAX.into();
         }
-        // x is rounded up; the tables fall, and want it rounded down.
+        // x is rounded up, but the tables fall with x, so look up a value that is rounded down.
         let down = x.saturating_sub((x >> 24) + halves);
         let factor = factor(x.into(), part(down)) + 1;
         let error = u128::from(self.pace) * u128::from(halves) * factor;
@@ -249,8 +263,8 @@ impl Bend {
     }
 }
 
-/// The coordinates of [`quotients_by`], and how far the quotients are outside the texture, in units
-/// of 2^-16 texel, rounded up, 256 texels at most; c is above zero.
+/// Returns the coordinates of [`quotients_by`], and how far the quotients lie outside the texture:
+/// in units of 2^-16 texel, rounded up, at most 256 texels. c must be above zero.
 #[inline]
 pub(crate) fn place(
     reciprocal: Reciprocal,
@@ -278,16 +292,17 @@ pub(crate) fn place(
 /// 1 / c, rounded up.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Above {
-    /// Bits that c is short of 64.
+    /// Leading zeros of c: 64 less its bits.
     zeros: u32,
-    /// 1 / c <= inverse 2^(zeros - 95), by less than a part in 2^29.
+    /// 1 / c <= inverse 2^(zeros - 95), and the right side is too large by less than one part in
+    /// 2^29.
     inverse: u64,
 }
 
 impl Above {
-    /// That of the same c. With h its highest 32 bits a [`Reciprocal`] has more than
-    /// 2^63 / (h + 1) - 1, and 2^63 / h is larger than 2^63 / (h + 1) by less than 2: three more is
-    /// no less.
+    /// Returns 1 / c, rounded up, for the c of `reciprocal`. With h the highest 32 bits of c, the
+    /// [`Reciprocal`] holds more than 2^63 / (h + 1) - 1, and 2^63 / h exceeds 2^63 / (h + 1) by
+    /// less than 2. So adding three yields at least 2^63 / h.
     pub(crate) fn new(reciprocal: Reciprocal) -> Self {
         let (zeros, inverse) = reciprocal.parts();
         Self {
@@ -296,19 +311,21 @@ impl Above {
         }
     }
 
-    /// |step| / c, 32 fraction bits, rounded up; [`END`] at most.
+    /// Returns |step| / c, 32 fraction bits, rounded up; at most [`END`].
     pub(crate) fn lean(&self, step: i64) -> u64 {
         let product = u128::from(step.unsigned_abs()) * u128::from(self.inverse);
         ((product >> (63 - self.zeros)) + 1).min(END.into()) as u64
     }
 
-    /// |D| / c^2, 32 fraction bits, rounded up: too large by a part in 2^28, and a last place or two.
+    /// Returns |D| / c^2, 32 fraction bits, rounded up: too large by one part in 2^28 plus one or
+    /// two units in the last place.
     pub(crate) fn pace(&self, d: u128) -> u64 {
         // |D| <= d 2^excess, and 1 / c^2 <= square 2^(2 zeros - 158).
         let excess = (128 - d.leading_zeros()).saturating_sub(63);
         let d = (d >> excess) + u128::from(excess > 0);
         let square = (u128::from(self.inverse) * u128::from(self.inverse)).div_ceil(1 << 32);
-        // Below 2^97. To be shifted up it would have to be above 2^91: no 64 bits hold that.
+        // Below 2^97. A negative `bits` needs `excess` above zero, so d is at least 2^62 and the
+        // product is above 2^91: shifted up, it does not fit 64 bits.
         let product = d * square;
         let bits = 126 - 2 * i64::from(self.zeros) - i64::from(excess);
         match bits {
@@ -318,23 +335,25 @@ impl Above {
     }
 }
 
-/// Longest chord in pixels: a row of the screen.
+/// Longest chord in steps: a row of the screen.
 const LONGEST: usize = modex::WIDTH - 1;
 
-/// Where along a run chords are good enough, by their length.
+/// The depths at which a chord keeps to a tolerance, for every length of the chord. "Depth" here is
+/// the value of the form c, an inverse depth: it is large near the eye.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chords {
-    /// R, rounded up, 8 fraction bits, below 2^42; in units of 2^`shift`, as all depths here.
+    /// R, rounded up: 8 fraction bits, below 2^42, in units of 2^`shift` as all depths here.
     root: u64,
-    /// What depths are cut by: the nearest has at most 32 bits then.
+    /// Bits that are cut off depths, so that the nearest depth has at most 32 bits.
     shift: u32,
-    /// T in units of 2^-16 texel, less two for the ends, which are rounded down.
+    /// T in units of 2^-16 texel, less two units for the ends, which are rounded down.
     most: u32,
 }
 
 impl Chords {
-    /// Those of runs along `walks`, all with the same c', that are to be off by `tolerance` units
-    /// of 2^-16 texel at most. `near` is the largest depth that will be asked for, and above zero.
+    /// Returns the permitted chords of spans along `walks`, which share one c', for an error of at
+    /// most `tolerance` units of 2^-16 texel. `near` is the largest depth of any later query, and
+    /// is above zero.
     #[inline]
     pub fn new(walks: &[Walk], near: i64, tolerance: u32) -> Self {
         let shift = 32u32.saturating_sub(near.leading_zeros());
@@ -346,16 +365,17 @@ impl Chords {
             fastest = passes[0].max(passes[1]).max(fastest);
             step = c.1.unsigned_abs();
         }
-        // Both cut to 31 bits, and rounded up.
+        // D and c' both as 31 bits and an exponent, rounded up.
         let (passes, exponent) = cut(fastest);
         let (step, more) = cut(step.into());
         let product = passes * step;
         if product == 0 || most == 0 {
-            // A straight run, or a tolerance that no chord keeps to.
+            // The texture coordinate is linear, or no chord keeps to the tolerance.
             let root = if most == 0 { 1 << 40 } else { 0 };
             return Self { root, shift, most };
         }
-        // R^3 is |D c'| 2^14 over T in these units: as 61 to 63 bits and a multiple of three.
+        // In these units R^3 is |D c'| 2^14 / T. Make it a number of 61 to 63 bits whose exponent
+        // is a multiple of three.
         let zeros = product.leading_zeros();
         let over = (product << zeros) / u64::from(most) + 1;
         let more_zeros = over.leading_zeros();
@@ -369,26 +389,27 @@ impl Chords {
         Self { root, shift, most }
     }
 
-    /// A depth in the units here.
+    /// Returns a depth in units of 2^`shift`, rounded down.
     #[inline]
     pub fn cut(&self, depth: i64) -> u64 {
         (depth >> self.shift) as u64
     }
 
-    /// R n^(2/3), rounded up.
+    /// Returns R n^(2/3) for n = `pixels`, rounded up: the least geometric mean of the depths at a
+    /// chord's ends.
     #[inline]
     fn mean(&self, pixels: u16) -> u64 {
         ((self.root * POWERS[usize::from(pixels)]) >> 24) + u64::from(self.root > 0)
     }
 
-    /// Whether no depth up to `near` lets a chord be as long.
+    /// Returns whether no depth up to `near` permits a chord over `pixels` pixels.
     #[inline]
     pub fn is_short_of(&self, pixels: u16, near: u64) -> bool {
         self.mean(pixels) > near
     }
 
-    /// Whether the whole of a run may be a chord. It does not pay for steps that are cut, nor for
-    /// ends that are clamped.
+    /// Returns whether a chord may span the whole of `pixels` pixels along `walk`. The test leaves
+    /// no room for the rounding of the steps or for clamped ends; [`Chords::least`] does.
     #[inline]
     pub fn keep(&self, walk: &Walk, pixels: u16) -> bool {
         let (from, to) = (walk.at[2], walk.after(pixels)[2]);
@@ -397,8 +418,9 @@ impl Chords {
         is_legal && mean >> 32 == 0 && self.cut(from) * self.cut(to) >= mean * mean
     }
 
-    /// What the product of the depths at the ends of a chord over so many pixels must not be less
-    /// than, `outside` being what the ends are clamped by; none is as large as [`u64::MAX`].
+    /// Returns the least product of the depths at the ends of a chord over `pixels` pixels, where
+    /// the ends are clamped by up to `outside` units. Returns [`u64::MAX`], which no product
+    /// reaches, if no depths suffice.
     #[inline]
     pub fn least(&self, pixels: u16, outside: u32) -> u64 {
         let spent = u64::from(pixels) + u64::from(outside);
@@ -415,7 +437,7 @@ impl Chords {
     }
 }
 
-/// n^(2/3), 16 fraction bits, rounded up.
+/// n^(2/3) for every n, 16 fraction bits, rounded up.
 const POWERS: [u64; LONGEST + 1] = {
     let mut powers = [0; LONGEST + 1];
     let mut n = 1;
@@ -426,9 +448,9 @@ const POWERS: [u64; LONGEST + 1] = {
     powers
 };
 
-/// The cube root of 1 to 2^66, rounded up.
+/// Returns the cube root of `n`, 1 to 2^66, rounded up.
 const fn root_by_bits(n: u128) -> u64 {
-    // The largest number whose cube is less.
+    // Find the largest number whose cube is below n.
     let (mut root, mut bit) = (0u64, 1 << 22);
     while bit > 0 {
         if ((root | bit) as u128).pow(3) < n {
@@ -439,56 +461,60 @@ const fn root_by_bits(n: u128) -> u64 {
     root + 1
 }
 
-/// No less than the cube root of `n`, 2^60 to 2^63 - 1, or of anything below n + 1; too large by a
-/// part in 2000 at most.
+/// Returns an upper bound of the cube root of every number below n + 1, for `n` from 2^60 to
+/// 2^63 - 1; too large by at most one part in 2000.
 #[inline]
 fn cube_root(n: u64) -> u64 {
     const GUESSES: [u32; 64] = {
         let mut guesses = [0; 64];
         let mut part = 8;
         while part < 64 {
-            // For its middle.
+            // The root for the middle of the part.
             guesses[part] = root_by_bits((2 * part as u128 + 1) << 56) as u32;
             part += 1;
         }
         guesses
     };
-    // A step of Newton's from either side leads above it, but for what two divisions cut off.
+    // A Newton step from either side ends at or above the root, except for what the two divisions
+    // cut off.
     let guess = u64::from(GUESSES[(n >> 57) as usize & 63]);
     (2 * guess + n / (guess * guess)) / 3 + 2
 }
 
-/// A number of at most 31 bits and an exponent: no less than `n`.
+/// Returns a number of at most 31 bits and an exponent, together not below `n`.
 #[inline]
 fn cut(n: u128) -> (u64, i32) {
     let excess = (128 - n.leading_zeros()).saturating_sub(31);
     ((n >> excess) as u64 + u64::from(excess > 0), excess as i32)
 }
 
-/// n c' - n' c of two forms' values and steps.
+/// Returns D = n c' - n' c, where `n` and `c` hold the values and the steps of two forms.
 pub(crate) fn passes(n: (i64, i64), c: (i64, i64)) -> i128 {
     i128::from(n.0) * i128::from(c.1) - i128::from(n.1) * i128::from(c.0)
 }
 
-/// What the error of the affine mapper depends on in a polygon: see [`crate::affine::Sides::walk`].
+/// The quantities that the error of the affine mapper depends on in a polygon: see
+/// [`crate::affine::Sides::walk`].
 ///
-/// A corner's own coordinates are not quite the quotients where it is snapped to. Between two
-/// corners a coordinate is a chord along the side, and down the column another chord between two of
-/// those: the errors add.
+/// A corner's own coordinates differ slightly from the quotients at the place where the corner is
+/// snapped to. Between two corners a coordinate is a chord along the side, and down the column it
+/// is another chord between points of two sides: these errors add up.
 #[derive(Clone, Copy, Debug)]
 pub struct Affine {
     plane: Plane,
-    /// The most that a coordinate is off on any side, 2^-16 texel.
+    /// The largest error of a coordinate on any side, including the corners, in units of 2^-16
+    /// texel.
     sides: u64,
-    /// The size of the texture: both coordinates are inside.
+    /// The size of the texture, which no error exceeds: both coordinates are inside.
     most: u64,
 }
 
 impl Affine {
-    /// What fixed point may add: 2^-7 texel, most of it where a texture is squeezed into a sliver.
+    /// Allowance for fixed point: 2^-7 texel, most of it for a texture that is squeezed into a
+    /// sliver.
     const ROUNDING: u64 = 512;
 
-    /// That of a polygon whose texture lies in `plane`.
+    /// Returns the quantities of a polygon whose texture lies in `plane`.
     pub fn new(polygon: &[Vertex], plane: &Plane, texture: &Texture<'_>) -> Self {
         let (u, v) = texture.last();
         let mut affine = Self {
@@ -507,17 +533,18 @@ impl Affine {
         affine
     }
 
-    /// The worst error of a coordinate in a column of the polygon, in units of 2^-16 texel.
+    /// Returns a bound of a coordinate's error in the column `run` of the polygon, in units of
+    /// 2^-16 texel.
     pub fn column(&self, run: &Run) -> u32 {
-        // The crossings have 32 fraction bits, and are off by less than 2^-23: 1/256 further out
-        // than they are.
+        // The crossings have 32 fraction bits and are off by less than 2^-23. Take places at least
+        // 1/256 pixel further out.
         let [top, bottom] = run.between.map(|crossing| (crossing.at >> 24) as i32);
         let x = i32::from(run.line) * 256 + 128;
         let column = self.chord(self.forms(x, top - 1), self.forms(x, bottom + 2));
         (column + self.sides + Self::ROUNDING).min(self.most) as u32
     }
 
-    /// The forms at a place in 1/256 pixel, 256 times.
+    /// Returns the forms at a place given in 1/256 pixel, multiplied by 256.
     fn forms(&self, x: i32, y: i32) -> [i128; 3] {
         [self.plane.a, self.plane.b, self.plane.c].map(|form| {
             let right = i128::from(form.right) * i128::from(x - 128);
@@ -526,7 +553,7 @@ impl Affine {
         })
     }
 
-    /// How far a corner's coordinates are from the quotients there.
+    /// Returns how far the coordinates of a corner are from the quotients there.
     fn corner(&self, vertex: &Vertex, [a, b, c]: [i128; 3]) -> u64 {
         if c <= 0 {
             return self.most;
@@ -535,9 +562,10 @@ impl Affine {
         off(a, vertex.u).max(off(b, vertex.v)).min(self.most.into()) as u64 + 1
     }
 
-    /// The closed form between two places.
+    /// Returns the closed form for a chord between two places.
     fn chord(&self, from: [i128; 3], to: [i128; 3]) -> u64 {
-        // As many bits as a form has on the screen; far off it they have more.
+        // Reduce the forms to as many bits as they have on the screen; far off the screen they have
+        // more.
         let size = |[a, b, c]: [i128; 3]| {
             let [a, b, c] = [a, b, c << 8].map(i128::unsigned_abs);
             a.max(b).max(c)
@@ -545,7 +573,7 @@ impl Affine {
         let excess = (128 - size(from).max(size(to)).leading_zeros()).saturating_sub(61);
         let [start, end] = [from, to].map(|forms| forms.map(|form| (form >> excess) as i64));
         let far = start[2].min(end[2]);
-        // Cutting the forms moves a quotient by less than a unit as long as c has 24 bits.
+        // Reducing the forms moves a quotient by less than one unit as long as c keeps 24 bits.
         if far < 1 << 24 {
             return self.most;
         }

@@ -1,67 +1,71 @@
-//! Which pixels of a polygon lie in each column, or in each row, of the screen.
+//! Coverage: the pixels of a polygon in each column, or in each row, of the screen.
 //!
 //! # The rule
 //!
-//! A pixel is inside when an odd number of edges have `ymin <= yc < ymax` and cross `yc` at
-//! `x <= xc`, where (xc, yc) is its centre: half-open and even-odd, decided in exact integers.
-//! That rule speaks of rows, and [`rows`] takes it as it stands: the first pixel right of an
-//! edge is the first with `xc >= x(yc)`, and the pixels between an odd crossing and the next
-//! even one are inside.
+//! A pixel with centre (xc, yc) is inside when an odd number of edges have `ymin <= yc < ymax` and
+//! cross `yc` at `x <= xc`. The rule is half-open and even-odd, and is decided in exact integers.
+//! It speaks of rows, so [`rows`] applies it as it stands: the first pixel to the right of an edge
+//! is the first with `xc >= x(yc)`, and the pixels between an odd crossing and the next even
+//! crossing are inside.
 //!
-//! [`columns`] needs it in other words. It says: move the centre right by an infinitesimal e,
-//! and down by a d that is infinitesimal even beside e; then nothing is ever exactly on an edge,
-//! and the plain even-odd test decides. (Moving right turns `x <= xc` into `x < xc + e`; moving
-//! down turns the half-open interval into an open one; and since d is so small beside e, the
-//! slope of the edge does not disturb the first.)
+//! [`columns`] needs the same rule in terms of columns. Restate the rule first: move the centre to
+//! the right by an infinitesimal e, and down by a d that is infinitesimal even compared with e.
+//! Then no edge ever passes exactly through a centre, and the plain even-odd test decides. (The
+//! move to the right turns `x <= xc` into `x < xc + e`. The move down turns the half-open interval
+//! into an open one. Because d is so small compared with e, the slope of the edge does not disturb
+//! the first comparison.)
 //!
-//! Said that way it can be asked down a column. The column at xc + e meets the edges with
-//! `xmin <= xc < xmax`, vertical ones never, and meets each at y(xc) + e dy/dx. A centre
-//! at yc + d lies below that crossing when yc > y(xc), and when yc = y(xc) only if dy/dx <= 0:
-//! for a rising edge (e times a positive slope) the crossing is further down than d. So the
-//! first row below an edge is
+//! In this form the test also works down a column. The column at xc + e meets exactly the edges
+//! with `xmin <= xc < xmax`, so it never meets a vertical edge. It meets each of them at
+//! y(xc) + e dy/dx. A centre at yc + d lies below that crossing when yc > y(xc). When yc = y(xc),
+//! it does so only if dy/dx <= 0: if the slope is positive, the crossing lies e dy/dx further down,
+//! which is more than d. So the first row below an edge is
 //!
 //! - the first with `yc >= y(xc)` if dy <= 0,
 //! - the first with `yc > y(xc)` if dy > 0,
 //!
-//! and the rows between an odd crossing and the next even one are inside. Had each slanted edge
-//! kept `>=`, columns would draw the transposed rule: other pixels than rows draw on ties, and
-//! gaps where the two meet.
+//! and the rows between an odd crossing and the next even crossing are inside. If every edge used
+//! `>=`, columns would draw the transposed rule: on ties they would draw other pixels than rows do,
+//! and leave gaps where the two meet.
 //!
 //! # The arithmetic
 //!
-//! Both scans walk *lines* (columns or rows), each a row of *cells* (its pixels), and differ in
-//! nothing but which coordinate is which, and the tie. Below, p counts across the lines and q
-//! along them: columns have (p, q) = (x, y), rows (y, x).
+//! Both scans go through *lines* (columns or rows), each of which is a row of *cells* (its pixels).
+//! They differ only in the roles of the coordinates and in the tie. Below, p counts across the
+//! lines and q along them: (p, q) is (x, y) for columns and (y, x) for rows. For the edge from
+//! (pa, qa) to (pb, qb) with pa < pb, dp = pb - pa and dq = qb - qa.
 //!
-//! With pa < pb the first cell past an edge is a floor of `N / (256 dp)`, N an integer that
-//! grows by `256 dq` from line to line. N's last 8 bits never change, and are cut: the cell is the
-//! floor of v = n / dp, n = floor(N / 256), and n grows by dq. v is stepped with 36 fraction bits,
-//! start and step rounded up. So it is above the true v by less than 1 for the start and 1 for each
-//! of at most 319 steps, in units of 2^-36; the true v is a multiple of 1 / dp, and below the next
-//! whole number by at least that, more than 2^12 such units: its floor is never another.
-//! |N| < 2^49 within [`MAX_COORDINATE`], dp <= 2^24, in either scan.
+//! The first cell past an edge is the floor of `N / (256 dp)`, where N is an integer that grows by
+//! `256 dq` from line to line. The last 8 bits of N never change, so they are dropped: the cell is
+//! the floor of v = n / dp, where n = floor(N / 256) grows by dq per line. The scan steps v with 36
+//! fraction bits, and rounds the start and the step up. So the stepped value is above v by less
+//! than 1 unit of 2^-36 for the start, and by less than 1 unit for each of at most 319 steps. v is
+//! a multiple of 1 / dp, so it is below the next whole number by at least 1 / dp, which is at least
+//! 2^12 of those units. The stepped value therefore always has the same floor as v. Within
+//! [`MAX_COORDINATE`], |N| < 2^49 and dp <= 2^24, in either scan.
 //!
-//! Between two vertices, in the order of the lines, the same edges cross every line: which they
-//! are is asked once for such a stretch. In a convex polygon they are two, and the smaller cell
-//! comes first: there is nothing to sort.
+//! Between two vertices that are neighbours in the order of the lines, every line crosses the same
+//! edges, so the scan determines these edges once for the whole stretch. A convex polygon has two
+//! of them, and the smaller cell comes first: no sort is needed.
 
 use crate::along::Along;
 use crate::{MAX_COORDINATE, MAX_SIDES, Point};
 use modex::{HEIGHT, WIDTH};
 
-/// Why a polygon is not drawn.
+/// The reason why a polygon is not drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dropped {
     /// More than [`MAX_SIDES`] vertices.
     TooManySides,
-    /// A vertex further out than [`MAX_COORDINATE`], or texture coordinates outside the texture.
+    /// A vertex is further out than [`MAX_COORDINATE`], or its texture coordinates are outside the
+    /// texture.
     OutOfRange,
 }
 
-/// Most runs in a line: a side begins or ends one.
+/// Most spans in a line: a span needs two sides, one at each end.
 pub(crate) const MAX_RUNS: usize = MAX_SIDES / 2;
 
-/// Which way a run of pixels goes.
+/// The direction of a span of pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Down a column.
@@ -70,45 +74,47 @@ pub enum Axis {
     Right,
 }
 
-/// Inside pixels without a gap, in one line: a column from [`columns`], a row from [`rows`]; of
-/// [`spans`] without the crossings, `End` being `()`.
+/// A span: consecutive inside pixels of one line. The line is a column from [`columns`] and a row
+/// from [`rows`]. [`spans`] yields spans without crossings: `End` is `()` there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Run<End = Crossing> {
     /// The column's x, or the row's y.
     pub line: u16,
     /// The first pixel: its y in a column, its x in a row.
     pub first: u16,
-    /// Pixels, at least 1; all of them are on the screen.
+    /// The number of pixels, at least 1; all of them are on the screen.
     pub len: u16,
-    /// Where the line enters the polygon and where it leaves it. Either may be off the screen.
+    /// The crossings where the line enters and leaves the polygon. Either may be off the screen.
     pub between: [End; 2],
 }
 
-/// Where a side of the polygon meets the middle of a line.
+/// A crossing of a polygon's side with the centre of a line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Crossing {
-    /// The side from vertex `side` to the next one.
+    /// The side from vertex `side` to the next vertex.
     pub side: usize,
-    /// y in a column, x in a row, in pixels with 32 fraction bits; off by less than 2^-23. It
-    /// decides no pixel: it is there to interpolate between the two ends of a run.
+    /// The crossing's y in a column, or its x in a row: in pixels with 32 fraction bits, off by
+    /// less than 2^-23. It decides no pixel; it serves to interpolate between the two ends of a
+    /// span.
     pub at: i64,
 }
 
-/// What a scan tells of where a side meets a line.
+/// What a scan reports about a side's crossing with a line: [`Crossing`], or nothing.
 trait End: Copy + Default {
-    /// What it is made of, for every side.
+    /// The precomputed data of a side that yields its crossings.
     type Along: Copy + Default;
 
-    /// That of a side from q = `a` on that rises by `dq` in `dp`, and is `p` further at line `first`.
+    /// Returns the data of a side that starts at q = `a`, rises by `dq` over `dp`, and has advanced
+    /// by `p` at line `first`.
     fn along(a: i32, dq: i32, dp: i32, first: i32, p: i32) -> Self::Along;
 
-    /// Where `side` meets `line`.
+    /// Returns the crossing of `side` with `line`.
     fn new(side: usize, along: &Self::Along, line: i32) -> Self;
 
     /// Whether crossings of the same cell may come in any order.
     const BY_CELL: bool;
 
-    /// Its order among crossings of the same cell.
+    /// Returns the sort key among crossings of the same cell.
     fn at(&self) -> i64;
 }
 
@@ -130,7 +136,7 @@ impl End for Crossing {
     }
 }
 
-/// The pixels are all that is asked for.
+/// For scans that need the pixels only.
 impl End for () {
     type Along = ();
     const BY_CELL: bool = true;
@@ -144,14 +150,15 @@ impl End for () {
     }
 }
 
-/// What makes a scan one by columns or by rows.
+/// The differences between a scan by columns and a scan by rows.
 struct Lines {
-    /// Lines on the screen, and pixels in each.
+    /// Lines on the screen, and pixels in each line.
     count: i32,
     cells: i64,
-    /// (p, q) of a point.
+    /// Returns (p, q) of a point.
     place: fn(Point) -> (i32, i32),
-    /// Whether a centre on the crossing is past the edge, by the edge's dq where dp > 0.
+    /// Returns whether a centre exactly on the crossing is past the edge, from the edge's dq where
+    /// dp > 0.
     tie: fn(i32) -> bool,
 }
 
@@ -176,18 +183,19 @@ const FRACTION: u32 = 36;
 #[derive(Clone, Copy, Default)]
 struct Edge<A> {
     side: usize,
-    /// Lines `first..end`.
+    /// The lines `first..end` that the edge crosses.
     first: i32,
     end: i32,
-    /// The first cell past the edge in the current line, [`FRACTION`] bits; at most a step
-    /// further out than the edge goes: below 2^26 cells.
+    /// The first cell past the edge in the current line, with [`FRACTION`] bits. It is at most one
+    /// step further out than the edge reaches: below 2^26 cells.
     cell: i64,
     step: i64,
     along: A,
 }
 
 impl<A: Copy> Edge<A> {
-    /// The edge from `a` to `b` in either order, or nothing if no line of the screen meets it.
+    /// Returns the edge between `a` and `b`, given in either order, or nothing if no line of the
+    /// screen meets it.
     #[inline]
     fn new<E: End<Along = A>>(
         side: usize,
@@ -195,7 +203,7 @@ impl<A: Copy> Edge<A> {
         b: (i32, i32),
         lines: &Lines,
     ) -> Option<Self> {
-        // Always forward: neighbours walk a shared edge with the same bits.
+        // Always forward, so that neighbours step along a shared edge with the same bits.
         let (a, b) = if a.0 <= b.0 { (a, b) } else { (b, a) };
         let (first, end) = crossed(a.0, b.0, lines.count)?;
         let (dp, dq) = (b.0 - a.0, b.1 - a.1);
@@ -216,8 +224,9 @@ impl<A: Copy> Edge<A> {
     }
 }
 
-/// Quotient, rounded down, and remainder; the quotient fits. Near the screen, which is nearly
-/// always, 32 bits hold all of it, and the division costs a fraction.
+/// Returns the quotient, rounded down, and the remainder. The quotient must fit 32 bits. Near the
+/// screen, which is nearly always, the numerator fits 32 bits as well, and a 32-bit division costs
+/// a fraction of a 64-bit division.
 #[inline]
 fn divided(n: i64, d: i32) -> (i32, i32) {
     match i32::try_from(n) {
@@ -229,41 +238,42 @@ fn divided(n: i64, d: i32) -> (i32, i32) {
     }
 }
 
-/// The lines `first..end` of the screen's `count` that an edge from `a` to `b`, `a <= b`,
-/// crosses, if there are any: line l has its centre at 256 l + 128, and a <= centre < b.
+/// Returns the lines `first..end` of the screen's `count` lines that an edge from `a` to `b`
+/// crosses, with `a <= b`, or nothing if it crosses no line. The centre of line l is at 256 l +
+/// 128, and the edge crosses it if a <= centre < b.
 pub(crate) fn crossed(a: i32, b: i32, count: i32) -> Option<(i32, i32)> {
     let first = ((a + 127) >> 8).max(0);
     let end = ((b + 127) >> 8).min(count);
     (first < end).then_some((first, end))
 }
 
-/// How far the centre of `line` is from `a`.
+/// Returns the distance from `a` to the centre of `line`.
 pub(crate) fn offset(line: i32, a: i32) -> i32 {
     line * 256 + 128 - a
 }
 
-/// Gives `sink` every run of inside pixels in every column of the screen, from left to right
-/// and in each column downward.
+/// Passes every span of inside pixels in every column of the screen to `sink`: columns from left to
+/// right, and downward in each column.
 ///
 /// # Errors
-/// A polygon outside the legal range; nothing of it was given to `sink`.
+/// If the polygon is outside the legal range; then `sink` has received no span.
 pub fn columns(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Result<(), Dropped> {
     scan::<Crossing>(polygon, &COLUMNS, sink)
 }
 
-/// Gives `sink` every run of inside pixels in every row of the screen, downward and in each row
-/// from left to right. The pixels are the same as those of [`columns`].
+/// Passes every span of inside pixels in every row of the screen to `sink`: rows downward, and from
+/// left to right in each row. The pixels are the same as those of [`columns`].
 ///
 /// # Errors
-/// A polygon outside the legal range; nothing of it was given to `sink`.
+/// If the polygon is outside the legal range; then `sink` has received no span.
 pub fn rows(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Run)) -> Result<(), Dropped> {
     scan::<Crossing>(polygon, &ROWS, sink)
 }
 
-/// [`columns`] or [`rows`].
+/// Passes the spans of [`columns`] or [`rows`] to `sink`, by `axis`.
 ///
 /// # Errors
-/// As they have.
+/// As for [`columns`] and [`rows`].
 pub fn runs(
     axis: Axis,
     polygon: &[impl Copy + Into<Point>],
@@ -275,10 +285,11 @@ pub fn runs(
     }
 }
 
-/// The same runs for those who need no crossings, which cost more than the pixels.
+/// Passes the same spans as [`runs`] to `sink`, without the crossings, which cost more than the
+/// pixels.
 ///
 /// # Errors
-/// As [`columns`] has.
+/// As for [`columns`].
 pub fn spans(
     axis: Axis,
     polygon: &[impl Copy + Into<Point>],
@@ -318,7 +329,7 @@ fn scan<E: End>(
     let edges = &mut edges[..count];
     let mut give = |line, [top, bottom]: [(i64, E); 2]| {
         let (mut first, mut end) = (top.0 >> FRACTION, bottom.0 >> FRACTION);
-        // Nearly all begin and end on the screen: a look at both signs.
+        // Nearly all spans begin and end on the screen: test both signs at once.
         if first | (lines.cells - end) < 0 {
             [first, end] = [first, end].map(|cell| cell.clamp(0, lines.cells));
         }
@@ -332,7 +343,8 @@ fn scan<E: End>(
         }
     };
     while line < stop {
-        // Edges that cross the line go to the front, the others are not yet there, or ended.
+        // Move the edges that cross the line to the front. The other edges start later, or have
+        // ended.
         let (mut active, mut end) = (0, stop);
         for i in 0..edges.len() {
             let edge = &edges[i];
@@ -350,12 +362,12 @@ fn scan<E: End>(
             let end = E::new(edge.side, &edge.along, line);
             (edge.cell, end)
         };
-        // By cells; within one by where the sides cross the line.
+        // By cell first; within a cell by the position of the crossing.
         let key = |&(cell, end): &(i64, E)| (cell >> FRACTION, end.at());
         match &mut edges[..active] {
             [] => {}
             [first, second] => {
-                // The compiler keeps the two in registers: nobody else sees them.
+                // Local copies, so that the compiler keeps the two edges in registers.
                 let (mut a, mut b) = (*first, *second);
                 for line in line..end {
                     let (mut top, mut bottom) = (crossing(&a, line), crossing(&b, line));
@@ -392,7 +404,7 @@ fn scan<E: End>(
     Ok(())
 }
 
-/// Whether the scan's arithmetic holds for `polygon`.
+/// Returns an error if the scan's arithmetic does not hold for `polygon`.
 pub(crate) fn check(polygon: &[impl Copy + Into<Point>]) -> Result<(), Dropped> {
     if polygon.len() > MAX_SIDES {
         return Err(Dropped::TooManySides);

@@ -1,23 +1,25 @@
-//! The exact perspective mapper: the quotient's texel at every pixel, and no rounding but the
+//! The exact perspective mapper: the texel of the quotient at every pixel, with no rounding but the
 //! floor.
 //!
-//! Legal input: a plane as [`Plane::new`] makes it, a column on the screen. Error: none against the
-//! quantised forms; what quantising them does is bounded in [`crate::plane`].
+//! Legal input: a plane as [`Plane::new`] makes it, and a column on the screen. Error: zero against
+//! the quantised forms; [`crate::plane`] bounds the effect of quantising them.
 //!
 //! # Why the loop does not clamp
 //!
-//! A pixel needs no clamp when a, b, w c - a and h c - b are at least zero, the last two above it
-//! (then c is, too). Each of them is linear down the column; where all hold at two pixels they hold
-//! at every pixel between. So the ends are taken off, pixel by pixel, until one is found from above
-//! and one from below that need none, and only the ends are clamped.
+//! With w and h the width and height of the texture, a pixel needs no clamp when a >= 0, b >= 0,
+//! w c - a > 0 and h c - b > 0; then c is above zero too. Each of the four is linear down the
+//! column, so if all hold at two pixels, they hold at every pixel between. So the loop searches
+//! from the top and from the bottom for the first pixel that needs no clamp, and clamps only the
+//! pixels outside these two.
 //!
 //! # Why most pixels are not divided
 //!
-//! Where the column bends little enough a linear estimate comes first, and a margin that
-//! [`crate::bounds`] says it is never off by. If the estimate less the margin and the estimate and
-//! the margin have the same floor, so has the quotient between them: that *is* the texel. Only
-//! where they have not, which is within the margin of a texel's border, the pixel is divided. At
-//! `MARGIN` that is one in 8 at most, where the texture is passed evenly.
+//! Where the coordinates curve little enough, the loop first makes a linear estimate, with a margin
+//! from [`crate::bounds`] that its error never exceeds. If the estimate minus the margin and the
+//! estimate plus the margin have the same floor, the quotient between them has it too, and that
+//! floor *is* the texel. Otherwise the estimate lies within the margin of a texel's border, and the
+//! loop divides. With the largest margin, `MARGIN`, it divides at most one pixel in 8 if the
+//! texture coordinates are spread evenly.
 //!
 //! [`Plane::new`]: crate::Plane::new
 
@@ -28,11 +30,11 @@ use crate::bounds::Bend;
 use crate::plane::{self, Walk};
 use crate::runs::{Cuts, Pieces};
 
-/// The most that an estimate may be off, in 2^-16 texel.
+/// The largest useful margin of an estimate, in units of 2^-16 texel.
 const MARGIN: u32 = 2048;
-/// Steps of the shortest pieces that are worth it.
+/// Steps of the shortest pieces that are worthwhile.
 const SHORTEST: u8 = 16;
-/// Below so many pixels dividing takes less than finding out.
+/// Below this number of pixels, dividing costs less than making the estimate.
 const LEAST: u16 = 24;
 
 /// Draws a column of `len` pixels.
@@ -60,7 +62,7 @@ pub fn column(texture: &Texture<'_>, mut walk: Walk, len: u16, column: Column<'_
     below.fill(|| texel(texture, walk.next()));
 }
 
-/// The texel at any pixel.
+/// Returns the texel at any pixel.
 #[inline]
 pub(crate) fn texel(texture: &Texture<'_>, [a, b, c]: [i64; 3]) -> u8 {
     let u = plane::texel(a, c, texture.width());
@@ -68,7 +70,7 @@ pub(crate) fn texel(texture: &Texture<'_>, [a, b, c]: [i64; 3]) -> u8 {
     texture.texel(u.into(), v.into())
 }
 
-/// The texel at a pixel that needs no clamp.
+/// Returns the texel at a pixel that needs no clamp.
 #[inline(always)]
 fn quotient(texture: &Texture<'_>, [a, b, c]: [i64; 3]) -> u8 {
     texture.texel((a / c) as usize, (b / c) as usize)
@@ -79,7 +81,8 @@ fn divided(texture: &Texture<'_>, mut walk: Walk, column: Column<'_>) {
     column.fill(|| quotient(texture, walk.next()));
 }
 
-/// The longest pieces whose linear estimate is good enough, and what it is off by at most.
+/// Returns the longest pieces whose linear estimate is good enough, and the estimate's margin;
+/// nothing if no pieces are.
 fn estimate(texture: &Texture<'_>, walk: &Walk, len: u16) -> Option<(Pieces, i32)> {
     if len < LEAST {
         return None;
@@ -123,7 +126,7 @@ fn estimated(
             let (u_most, v_most) = (u + 2 * margin, v + 2 * margin);
             let at = i;
             i += 1;
-            // The bits above the fractions differ.
+            // The whole parts differ.
             if (((u ^ u_most) | (v ^ v_most)) as u32) >> 16 != 0 {
                 return quotient(texture, walk.after(at));
             }

@@ -1,29 +1,32 @@
-//! The free direction: along the line of constant depth, wherever it goes.
+//! The free-direction mapper: spans along the lines of constant depth, in whatever direction they
+//! run.
 //!
-//! Every plane has lines of constant depth on the screen: those along which c stays, c.right dx +
-//! c.down dy = 0. Along one of them u and v are linear, and one division serves it. Pixels do not
-//! lie on it, so it is drawn through those nearest to it: a line nearer the horizontal has one pixel
-//! in every column that it crosses, one nearer the vertical one in every row. The lines are the
-//! same one moved by whole pixels (down, or to the right), so each pixel of the screen lies on
-//! exactly one.
+//! Every plane has lines of constant depth on the screen: along them c stays constant, so
+//! c.right dx + c.down dy = 0. Along such a line u and v are linear, and one division serves the
+//! whole line. Pixels do not lie exactly on the line, so the mapper draws it through the pixels
+//! nearest to it. A line nearer the horizontal has one pixel in every column that it crosses, and a
+//! line nearer the vertical has one pixel in every row. All lines are copies of one line, moved by
+//! whole pixels (down, or to the right), so each pixel of the screen lies on exactly one line.
 //!
 //! # Which pixels
 //!
-//! Those of coverage, each once. Say the line is nearer the horizontal, S(x) whole pixels down at
-//! column x. Pixel (x, y) lies on line y - S(x), and an inside run of column x becomes a range of
-//! lines. Going from a column to the next, the lines that are in a range no longer are closed, each
-//! a job from the column where it was opened; those that are new are opened. Only what differs is
-//! looked at. Nearer the vertical, columns and rows change places.
+//! Exactly the pixels of coverage, each once. Take a line nearer the horizontal, S(x) whole pixels
+//! down at column x. Pixel (x, y) lies on line y - S(x), so an inside span of column x becomes a
+//! range of lines. From a column to the next, the mapper closes the lines that have left the
+//! ranges, and each becomes a job from the column where it was opened; it opens the lines that are
+//! new in the ranges. Only the differences are examined. Nearer the vertical, columns and rows
+//! change places.
 //!
 //! # Error
 //!
-//! The line passes up to half a pixel beside the centres of its pixels, across it: down a column
-//! where it is nearer the horizontal. There u is a hyperbola, so the error is no larger than the
-//! larger of u's differences between the centre and the two places [`ASIDE`] above and below it,
-//! plus what [`level::drift`](crate::level::drift) says for the pixel's number in its line, and the
-//! last place of the forms for each pixel of it. To first order that is half a pixel's worth of the
-//! texture's gradient across the line; it is reached. Where c is not above zero on a line, or its
-//! coordinates go further than 4096 texels, its pixels are drawn exactly.
+//! Across its direction, the line passes up to half a pixel beside the centres of its pixels: down
+//! the column for a line nearer the horizontal. In that direction u is a hyperbola. So the error is
+//! at most the sum of three terms: the larger of u's differences between the centre and the two
+//! places [`ASIDE`] above and below it; [`level::drift`](crate::level::drift) for the pixel's
+//! number in its line; and one unit in the last place of the forms for each of the line's pixels.
+//! To first order that is half a pixel's worth of the texture's gradient across the line, and this
+//! error does occur. Where c is not above zero on a line, or the line's coordinates go further than
+//! 4096 texels, its pixels are drawn exactly.
 
 use crate::coverage::{Axis, Dropped, MAX_RUNS, spans};
 use crate::job::{self, Job};
@@ -32,35 +35,37 @@ use crate::plane::{self, Form, Plane};
 use crate::{Face, Texture, affine};
 use modex::{HEIGHT, WIDTH};
 
-/// Fraction bits of a line's place aside: 320 steps leave it within 2^-14 pixel.
+/// Fraction bits of a line's offset across its direction: 320 steps keep it within 2^-14 pixel.
 const FRACTION: u32 = 22;
-/// Furthest that a line passes from a pixel's centre, in 2^-14 pixel: half of one, and what the
-/// steps of its place leave.
+/// Largest distance of a line from a pixel's centre, in 2^-14 pixel: half a pixel, plus the error
+/// of the offset's steps.
 pub const ASIDE: i32 = (1 << 13) + 1;
 /// Half a pixel.
 const HALF: i32 = 1 << (FRACTION - 1);
-/// Lines that meet the screen: one for each pixel of its first column, and one more for each
-/// pixel that the slope, 1 at most, takes it aside over the width. Rows have as many.
+/// Upper limit of the number of lines that meet the screen: one for each pixel of the first column,
+/// and one for each pixel that the slope, at most 1, shifts a line over the width. Rows have
+/// equally many.
 const LINES: usize = WIDTH + HEIGHT;
 
-/// A walk along a line that leaves its row or column pixel by pixel.
+/// A walk along a line that moves between rows or columns from pixel to pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Walk {
-    /// The texture's coordinates and their steps along the line.
+    /// The texture coordinates, and their steps along the line.
     pub texture: affine::Walk,
-    /// How far aside the line is at the first pixel: 22 fraction bits, 0 to 1.
+    /// The line's offset across its direction at the first pixel: 22 fraction bits, 0 to 1.
     pub aside: i32,
-    /// Its step, -1 to 1.
+    /// The step of `aside`, -1 to 1.
     pub slope: i32,
 }
 
 impl Walk {
-    /// Pixels that pixel `i` lies aside of the first one's row or column.
+    /// Returns the offset of pixel `i` from the first pixel's row or column, in pixels.
     pub fn aside(&self, i: u16) -> i16 {
         ((self.aside + self.slope * i32::from(i)) >> FRACTION) as i16
     }
 
-    /// The walk from pixel `i` on, whose row or column it counts from.
+    /// Returns the walk that starts at pixel `i`, with offsets relative to that pixel's row or
+    /// column.
     pub(crate) fn after(&self, i: u16) -> Self {
         let aside = self.aside + self.slope * i32::from(i);
         Self {
@@ -70,7 +75,7 @@ impl Walk {
         }
     }
 
-    /// How many pixels from `i` on, of `len` in all, lie in the same row or column.
+    /// Returns how many pixels from `i` on, of `len` in all, lie in the same row or column.
     pub(crate) fn straight(&self, i: u16, len: u16) -> u16 {
         let here = self.aside(i);
         let end = (i + 1..len).find(|&next| self.aside(next) != here);
@@ -90,16 +95,16 @@ impl Iterator for Walk {
 #[derive(Debug)]
 struct Lines {
     plane: Plane,
-    /// Which way a line goes from pixel to pixel.
+    /// The direction in which a line advances by one pixel per step.
     axis: Axis,
-    /// How far aside it is at pixel 0, and its step, with [`FRACTION`] bits.
+    /// The offset across that direction at pixel 0, and its step, with [`FRACTION`] bits.
     start: i32,
     slope: i32,
     /// Steps of a and b along a line.
     step: [i64; 2],
 }
 
-/// A form's steps: along `axis`, and aside of it.
+/// Returns a form's steps along `axis` and across it.
 fn steps(form: &Form, axis: Axis) -> (i64, i64) {
     match axis {
         Axis::Right => (form.right, form.down),
@@ -107,7 +112,7 @@ fn steps(form: &Form, axis: Axis) -> (i64, i64) {
     }
 }
 
-/// The pixel at its places along `axis` and aside of it.
+/// Returns the pixel (x, y) with these positions along `axis` and across it.
 fn place(axis: Axis, along: u16, aside: u16) -> (u16, u16) {
     match axis {
         Axis::Right => (along, aside),
@@ -115,7 +120,7 @@ fn place(axis: Axis, along: u16, aside: u16) -> (u16, u16) {
     }
 }
 
-/// n / d, rounded to nearest.
+/// Returns n / d, rounded to nearest.
 fn rounded(n: i128, d: i128) -> i128 {
     let (n, d) = if d < 0 { (-n, -d) } else { (n, d) };
     (2 * n + d).div_euclid(2 * d)
@@ -123,16 +128,16 @@ fn rounded(n: i128, d: i128) -> i128 {
 
 impl Lines {
     fn new(plane: &Plane) -> Self {
-        // A line goes the way in which c changes less.
+        // A line advances in the direction in which c changes less.
         let axis = match plane.c.right.unsigned_abs() < plane.c.down.unsigned_abs() {
             true => Axis::Right,
             false => Axis::Down,
         };
         let (c_along, c_aside) = steps(&plane.c, axis);
-        // Both zero: depth is constant all over, and any line is one.
+        // Both are zero: depth is constant everywhere, and any line will do.
         let c_aside = if c_aside == 0 { 1 } else { c_aside };
         let slope = rounded(-(i128::from(c_along) << FRACTION), c_aside.into()) as i32;
-        // A step's unit lost is one of the form's last place for each pixel.
+        // The rounding moves a form by at most one unit in the last place for each pixel.
         let step = [plane.a, plane.b].map(|form| {
             let (along, aside) = steps(&form, axis);
             let share = i128::from(aside) * i128::from(c_along);
@@ -142,8 +147,8 @@ impl Lines {
             Axis::Right => WIDTH,
             Axis::Down => HEIGHT,
         };
-        // Lines are numbered from 0: none lies before the screen's first pixel. A line without
-        // slope goes through the centres.
+        // Lines are numbered from 0, so that no line lies before the screen's first pixel. A line
+        // without slope passes through the pixels' centres.
         let furthest = HALF + slope * (pixels as i32 - 1);
         let start = HALF - (furthest.max(HALF) >> FRACTION << FRACTION);
         Self {
@@ -155,17 +160,18 @@ impl Lines {
         }
     }
 
-    /// How far aside a line is at pixel `along`, from where it is numbered; below zero.
+    /// Returns the offset of line 0 at pixel `along`; its whole pixels are zero or below.
     fn aside(&self, along: u16) -> i32 {
         self.start + self.slope * i32::from(along)
     }
 
-    /// The number of the line through a pixel, by its places along the axis and aside of it.
+    /// Returns the number of the line through the pixel at these positions along the axis and
+    /// across it.
     fn line(&self, along: u16, aside: u16) -> usize {
         (i32::from(aside) - (self.aside(along) >> FRACTION)) as usize
     }
 
-    /// Gives `sink` the jobs of the pixels `from..to` of a line.
+    /// Passes the jobs of pixels `from..to` of a line to `sink`.
     fn draw(
         &self,
         line: usize,
@@ -191,7 +197,7 @@ impl Lines {
             aside: skew(first).1,
             slope: self.slope,
         };
-        // On the line itself, beside the first pixel's centre.
+        // The forms on the line itself, beside the first pixel's centre.
         let (aside, fraction) = skew(0);
         let (x, y) = place(self.axis, from, aside);
         let at = [self.plane.a, self.plane.b, self.plane.c].map(|form| {
@@ -222,7 +228,7 @@ impl Lines {
     }
 }
 
-/// The lines that are inside at one place: ranges in order, none touching another's inside.
+/// The lines that are inside at one position: disjoint ranges, in order.
 #[derive(Clone, Copy, Debug)]
 struct Inside {
     ranges: [(usize, usize); MAX_RUNS],
@@ -244,7 +250,7 @@ impl Inside {
         &self.ranges[..self.len]
     }
 
-    /// Gives `sink` the lines that are inside here and not in `other`.
+    /// Passes the lines that are inside here and not in `other` to `sink`.
     fn without(&self, other: &Self, mut sink: impl FnMut(usize)) {
         for &(mut first, end) in self.ranges() {
             for &(from, to) in other.ranges() {
@@ -260,17 +266,17 @@ impl Inside {
     }
 }
 
-/// Gives `sink` the jobs of a face.
+/// Passes the jobs of a face to `sink`.
 ///
 /// # Errors
-/// A polygon outside the legal range; nothing of it was given to `sink`.
+/// If the polygon is outside the legal range; then `sink` has received no job.
 pub(crate) fn jobs(
     face: &Face<'_>,
     texture: &Texture<'_>,
     mut sink: impl FnMut(Job),
 ) -> Result<(), Dropped> {
     let lines = Lines::new(&face.plane());
-    // The runs go across the lines.
+    // The spans go across the lines.
     let across = match lines.axis {
         Axis::Right => Axis::Down,
         Axis::Down => Axis::Right,

@@ -1,4 +1,4 @@
-//! Jobs: runs of pixels to draw, and the bounded list that holds them.
+//! Jobs: spans of pixels to draw, and the bounded list that holds them.
 
 use core::iter;
 
@@ -11,55 +11,56 @@ use crate::runs::{self, Cuts, Pieces, Steps};
 use crate::within::Tolerance;
 use crate::{Texture, adaptive, affine, exact, free, level, plane};
 
-/// How a run's texture is walked: starts and steps, one mapper's or another's.
+/// How the texture coordinates advance along a span: start values and steps, in a mapper's own
+/// form.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Walk {
-    /// [`affine`].
+    /// Constant steps: see [`affine`].
     Affine(affine::Walk),
-    /// [`exact`].
+    /// A quotient for every pixel: see [`exact`].
     Exact(plane::Walk),
-    /// [`Steps::linear`].
+    /// Linear pieces: see [`Steps::linear`].
     Linear(plane::Walk, Pieces),
-    /// [`Steps::quadratic`].
+    /// Quadratic pieces: see [`Steps::quadratic`].
     Quadratic(plane::Walk, Pieces),
-    /// [`adaptive`].
+    /// Linear pieces within a tolerance: see [`adaptive`].
     Adaptive(plane::Walk, Tolerance),
-    /// [`level`]: one coordinate stays.
+    /// Constant depth, with only one coordinate stepped: see [`level`].
     Wall(level::Wall),
-    /// [`free`]: the run leaves its row or column.
+    /// A span that leaves its row or column: see [`free`].
     Free(free::Walk),
 }
 
-/// How the pixels of a row are reached.
+/// How the pixels of a row are written.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Rows {
-    /// Address, plane and texel anew for every pixel.
+    /// Computes address, plane and texel from scratch for every pixel.
     Multiply,
-    /// Stepped, the plane selected for every pixel.
+    /// Steps everything, and selects the plane for every pixel.
     Steps,
-    /// In four passes, one a plane.
+    /// Draws the row in four passes, one for each plane.
     Passes,
-    /// All texels one after the other, and then the planes: see [`Destination::line`].
+    /// Makes all texels one after the other, and then writes the planes: see [`Destination::line`].
     #[default]
     Lines,
 }
 
-/// Affine rows of fewer pixels are stepped where the others are drawn by [`Rows::Lines`]: a line in
-/// RAM is made first, and costs as much as some eight planes selected. Runs in the free direction
-/// are mostly such.
+/// Under [`Rows::Lines`], affine rows of fewer pixels are stepped instead: a line is first made in
+/// RAM, and that costs as much as selecting a plane about eight times. Most spans in the free
+/// direction are this short.
 const SHORT_ROW: u16 = 8;
 
-/// How runs are drawn.
+/// How spans are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Style {
     /// The loop for affine columns.
     pub affine: Loop,
-    /// For rows.
+    /// The way to write rows.
     pub rows: Rows,
 }
 
 impl Style {
-    /// What draws so on this CPU.
+    /// Returns the functions that draw in this style on this CPU.
     pub(crate) fn tools(self) -> Tools {
         Tools {
             column: self.affine.draw(),
@@ -70,7 +71,7 @@ impl Style {
     }
 }
 
-/// A [`Style`] with its loop found: once for many runs.
+/// A [`Style`] with its functions looked up: once for many spans.
 #[derive(Debug)]
 pub(crate) struct Tools {
     /// Draws affine columns.
@@ -82,25 +83,25 @@ pub(crate) struct Tools {
     rows: Rows,
 }
 
-/// One run to draw: where, and what the mapper needs to walk its texture.
+/// One span to draw: its place, and everything its inner loop needs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Job {
-    /// Down a column or along a row.
+    /// Direction: down a column or along a row.
     pub axis: Axis,
     /// The first pixel's column, 0 to 319.
     pub x: u16,
-    /// Its row, 0 to 239.
+    /// The first pixel's row, 0 to 239.
     pub y: u16,
-    /// Pixels, at least 1.
+    /// The number of pixels, at least 1.
     pub len: u16,
-    /// Which of the scene's textures.
+    /// Index of the texture among the scene's textures.
     pub texture: u16,
-    /// Its walk.
+    /// The texture coordinates along the span.
     pub walk: Walk,
 }
 
 impl Job {
-    /// The run of `len` pixels from pixel `first` of column or row `line`.
+    /// Returns the job of `len` pixels from pixel `first` of column or row `line`.
     pub(crate) fn new(
         axis: Axis,
         line: u16,
@@ -123,8 +124,8 @@ impl Job {
         }
     }
 
-    /// Each pixel with its coordinates in the texture, 16.16: the clear twin of [`Job::draw`].
-    /// The exact mapper's are rounded down.
+    /// Passes each pixel with its texture coordinates, 16.16, to `sink`: the reference
+    /// implementation of [`Job::draw`]. Coordinates of the exact mapper are rounded down.
     pub fn pixels(&self, texture: &Texture<'_>, mut sink: impl FnMut((u16, u16), (i32, i32))) {
         let mut pixels = |job: &Self| {
             let mut coordinates = Coordinates::new(job, texture);
@@ -155,7 +156,7 @@ impl Job {
         }
     }
 
-    /// The pieces of a run that is adaptive.
+    /// Returns the pieces of an adaptive span.
     #[inline]
     fn pieces(
         &self,
@@ -167,15 +168,15 @@ impl Job {
         adaptive::Pieces::new(walk, self.len, row, tolerance, texture)
     }
 
-    /// Whether the run keeps to one column.
+    /// Returns whether the span stays in one column.
     pub fn is_column(&self) -> bool {
         self.axis == Axis::Down && !matches!(self.walk, Walk::Free(_))
     }
 
-    /// The `len` pixels of the run from pixel `first` on.
+    /// Returns the job of the `len` pixels from pixel `first` of this span on.
     ///
-    /// Pieces begin anew at its first pixel. They are no longer than the whole run's, and lie
-    /// within it: no [bound](crate::bounds) is another one.
+    /// Pieces start again at the part's first pixel. They are no longer than the pieces of the
+    /// whole span, and lie within it, so every [bound](crate::bounds) still holds.
     pub(crate) fn part(&self, first: u16, len: u16) -> Self {
         let (x, y) = self.place(first);
         let after = |mut walk: plane::Walk| {
@@ -200,7 +201,7 @@ impl Job {
         }
     }
 
-    /// Where pixel `i` of the run is.
+    /// Returns the place (x, y) of pixel `i` of the span.
     #[inline]
     pub(crate) fn place(&self, i: u16) -> (u16, u16) {
         let aside = match &self.walk {
@@ -213,7 +214,7 @@ impl Job {
         }
     }
 
-    /// Draws the run.
+    /// Draws the span.
     #[inline]
     pub fn draw(&self, style: Style, texture: &Texture<'_>, destination: &mut impl Destination) {
         self.draw_with(&style.tools(), texture, destination);
@@ -234,7 +235,7 @@ impl Job {
         }
     }
 
-    /// Draws a row, or a run in the free direction.
+    /// Draws a row, or a span in the free direction.
     #[inline(never)]
     fn draw_other(&self, tools: &Tools, texture: &Texture<'_>, destination: &mut impl Destination) {
         match &self.walk {
@@ -249,7 +250,7 @@ impl Job {
         }
     }
 
-    /// Draws those of the run's pixels that lie in `plane`, which is selected.
+    /// Draws the span's pixels that lie in `plane`, which must be selected.
     #[inline]
     pub fn draw_in_plane(
         &self,
@@ -263,7 +264,8 @@ impl Job {
         }
     }
 
-    /// The plane of a run that keeps to its column. Any other may have pixels in each.
+    /// Returns the plane of a span that stays in its column. Any other span may have pixels in
+    /// every plane.
     #[inline]
     fn plane(&self) -> Option<u16> {
         match (self.axis, &self.walk) {
@@ -272,7 +274,8 @@ impl Job {
         }
     }
 
-    /// Draws those pixels of the run in `plane`, which is selected; it is that of a column.
+    /// Draws the span's pixels that lie in `plane`, which must be selected. A column must lie in
+    /// `plane`.
     #[inline(always)]
     pub(crate) fn draw_in_plane_with(
         &self,
@@ -288,7 +291,7 @@ impl Job {
         }
     }
 
-    /// The same of a row, or a run in the free direction.
+    /// Draws the pixels in `plane` of a row, or of a span in the free direction.
     #[inline(never)]
     fn draw_other_in_plane(
         &self,
@@ -307,7 +310,8 @@ impl Job {
         }
     }
 
-    /// The run in the free direction as affine runs, each within its row or column.
+    /// Passes the span in the free direction to `sink` as affine spans, each within its row or
+    /// column.
     fn straight(&self, walk: &free::Walk, mut sink: impl FnMut(Self)) {
         let mut first = 0;
         while first < self.len {
@@ -324,7 +328,7 @@ impl Job {
         }
     }
 
-    /// A column, its plane selected.
+    /// Draws a column, whose plane must be selected.
     #[inline(always)]
     fn draw_column(
         &self,
@@ -358,7 +362,7 @@ impl Job {
         }
     }
 
-    /// A row.
+    /// Draws a row.
     fn draw_row(&self, tools: &Tools, texture: &Texture<'_>, destination: &mut impl Destination) {
         match (tools.rows, self.walk) {
             (Rows::Multiply, Walk::Affine(walk)) => {
@@ -391,7 +395,7 @@ impl Job {
         }
     }
 
-    /// The pixels of a row in one plane, which is selected.
+    /// Draws the pixels of a row in one plane, which must be selected.
     fn draw_part(
         &self,
         plane: u16,
@@ -408,7 +412,7 @@ impl Job {
         }
     }
 
-    /// Puts the texels of every `STRIDE`th pixel of a row from pixel `first` on into their places.
+    /// Writes the texels of every `STRIDE`th pixel of a row, from pixel `first` on, to `places`.
     fn fill_row<const STRIDE: u16>(
         &self,
         first: u16,
@@ -457,12 +461,12 @@ impl Job {
 }
 
 fn texel(texture: &Texture<'_>, coordinates: Option<(i32, i32)>) -> u8 {
-    // Walks have no end.
+    // A walk never ends, so the default is never used.
     let (u, v) = coordinates.unwrap_or_default();
     texture.at(u, v)
 }
 
-/// A run's coordinates, pixel after pixel.
+/// A span's texture coordinates, pixel after pixel.
 enum Coordinates {
     Affine(affine::Walk),
     Exact(plane::Walk, (u16, u16)),
@@ -509,26 +513,26 @@ pub struct JobList<const N: usize> {
     jobs: [Job; N],
     len: usize,
     leaves_columns: bool,
-    /// For each job and plane the next in the chain: see [`ByPlane`].
+    /// For each job and plane, the index of the next job in the plane's chain: see [`ByPlane`].
     next: [[u16; 4]; N],
 }
 
 /// The jobs of a list, plane by plane.
 ///
-/// Each plane has a chain of the jobs that may have pixels in it: a pass sees its own jobs only.
+/// Each plane has a chain of the jobs that may have pixels in it, so a pass visits only these jobs.
 #[derive(Debug)]
 pub(crate) struct ByPlane<'a> {
     jobs: &'a [Job],
     next: &'a [[u16; 4]],
-    /// The first job in each plane's chain.
+    /// The index of the first job in each plane's chain.
     first: [u16; 4],
 }
 
 impl<'a> ByPlane<'a> {
-    /// The end of a chain, behind every job.
+    /// The end of a chain: greater than every index of a job.
     const END: u16 = u16::MAX;
 
-    /// The jobs that may have pixels in `plane`, in the order in which they came.
+    /// Returns the jobs that may have pixels in `plane`, in the order of their addition.
     #[inline]
     pub fn plane(&self, plane: u16) -> impl Iterator<Item = &'a Job> {
         let (jobs, next) = (self.jobs, self.next);
@@ -557,7 +561,7 @@ impl<const N: usize> JobList<N> {
         }),
     };
 
-    /// An empty list.
+    /// Returns an empty list.
     pub const fn new() -> Self {
         Self {
             jobs: [Self::EMPTY; N],
@@ -570,7 +574,7 @@ impl<const N: usize> JobList<N> {
     /// Adds a job, unless the list is full.
     ///
     /// # Errors
-    /// The job, when there is no room for it.
+    /// The job, if the list is full.
     pub fn push(&mut self, job: Job) -> Result<(), Job> {
         let place = self.jobs.get_mut(self.len).ok_or(job)?;
         *place = job;
@@ -579,23 +583,23 @@ impl<const N: usize> JobList<N> {
         Ok(())
     }
 
-    /// Whether any of the jobs has pixels in more than one column.
+    /// Returns whether any of the jobs has pixels in more than one column.
     pub(crate) fn leaves_columns(&self) -> bool {
         self.leaves_columns
     }
 
-    /// The jobs, in the order in which they came.
+    /// Returns the jobs, in the order of their addition.
     pub fn jobs(&self) -> &[Job] {
         &self.jobs[..self.len]
     }
 
-    /// The jobs by planes.
+    /// Returns the jobs by planes.
     pub(crate) fn by_plane(&mut self) -> ByPlane<'_> {
         const { assert!(N <= ByPlane::END as usize, "a chain's links are 16 bits") };
         let (jobs, next) = (&self.jobs[..self.len], &mut self.next[..self.len]);
         let mut first = [ByPlane::END; 4];
-        // From the last on: each goes before those that are chained. What its link to the chains
-        // of other planes says nobody asks.
+        // From the last job to the first, so that each job is put in front of its chains. A job's
+        // links in chains that it does not belong to are never read.
         for (i, (job, next)) in jobs.iter().zip(next.iter_mut()).enumerate().rev() {
             *next = first;
             match job.plane() {
@@ -627,7 +631,7 @@ mod tests {
 
     use super::*;
 
-    /// Later jobs lie over earlier ones: no chain may turn them about, and none may lose one.
+    /// Later jobs overwrite earlier ones, so a chain must keep their order and lose no job.
     #[test]
     fn every_plane_has_its_jobs_in_the_order_in_which_they_came() {
         let mut random = seeded::generator();

@@ -1,13 +1,13 @@
-//! Constant depth: walls and floors, where one division serves a whole run.
+//! The constant-z mapper: walls and floors, where one division serves a whole span.
 //!
 //! Where the plane's c does not change down the columns (a wall) or along the rows (a floor), a
-//! run has one depth: u = a / c and v = b / c are linear along it, and the affine walk is the
-//! perspective one. A wall whose u is constant as well (its texture stands upright) steps one
-//! coordinate only. Any other plane is left to the exact mapper's columns.
+//! span has a single depth: u = a / c and v = b / c are linear along it, so the affine walk is
+//! exact perspective. A wall whose u is constant as well (its texture stands upright) steps one
+//! coordinate only. For any other plane, the exact mapper draws the columns.
 //!
 //! Legal input: any face. Error against the quotient of the plane's integers, clamped into the
-//! texture: no more than [`drift`] says. Where c is not above zero, or the walk goes further than
-//! 4096 texels, the run is exact.
+//! texture: at most [`drift`]. Where c is not above zero, or the walk goes further than 4096
+//! texels, the span is drawn exactly.
 
 use modex::Column;
 
@@ -17,23 +17,25 @@ use crate::plane::{self, Plane};
 use crate::straight::Straight;
 use crate::{Face, Texture, affine};
 
-/// Most that a coordinate is off at pixel `i` of a run of constant depth, 16.16: the step is
-/// rounded to nearest, the start is rounded down, and the reciprocal is off by 2^-31 of itself,
-/// which is an eighth at the 4096 texels that a walk may reach, in its start and in its steps.
+/// Returns the largest error of a coordinate at pixel `i` of a span of constant depth, 16.16. The
+/// step is rounded to nearest, the start is rounded down, and the reciprocal is off by 2^-31 of its
+/// value: at the 4096 texels that a walk may reach, that is 1/8 of a unit in the start and 1/8 in
+/// the steps.
 pub fn drift(i: u16) -> i32 {
     i32::from(i) / 2 + 3
 }
 
-/// One over a depth.
+/// The reciprocal of a depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reciprocal {
-    /// 2^63 / c, c shifted to 32 bits; off by less than 2^-31 of itself, either way.
+    /// 2^63 / c, where c is shifted to 32 bits; off by less than 2^-31 of its value, in either
+    /// direction.
     factor: i128,
     shift: u32,
 }
 
 impl Reciprocal {
-    /// Of c, if it is above zero.
+    /// Returns the reciprocal of c, or nothing unless c is above zero.
     pub(crate) fn new(c: i64) -> Option<Self> {
         if c <= 0 {
             return None;
@@ -51,28 +53,29 @@ impl Reciprocal {
         })
     }
 
-    /// n / c, 16.16, rounded down.
+    /// Returns n / c, 16.16, rounded down.
     pub(crate) fn times(self, n: i64) -> i128 {
         (i128::from(n) * self.factor) >> self.shift
     }
 
-    /// n / c, 16.16, rounded to nearest.
+    /// Returns n / c, 16.16, rounded to nearest.
     fn nearest(self, n: i64) -> i128 {
         (i128::from(n) * self.factor + (1 << (self.shift - 1))) >> self.shift
     }
 }
 
-/// The forms along a run of constant depth.
+/// The forms along a span of constant depth.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Line {
-    /// a and b at the first pixel, and c, which stays.
+    /// a and b at the first pixel, and the constant c.
     pub at: [i64; 3],
     /// The steps of a and b.
     pub step: [i64; 2],
 }
 
 impl Line {
-    /// The walk over `len` pixels, if c is above zero and the walk is not out of reach.
+    /// Returns the walk over `len` pixels, or nothing if c is not above zero or the walk goes out
+    /// of reach.
     pub(crate) fn straight(&self, len: u16) -> Option<Straight> {
         let [a, b, c] = self.at;
         let over = Reciprocal::new(c)?;
@@ -89,14 +92,14 @@ impl Line {
     }
 }
 
-/// A walk down a column that keeps to one column of the texture.
+/// A walk down a column that stays in one column of the texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Wall {
-    /// Across the texture, 16.16.
+    /// Coordinate across the texture, 16.16.
     pub u: i32,
-    /// Down the texture, 16.16.
+    /// Coordinate down the texture at the first pixel, 16.16.
     pub v: i32,
-    /// Its step from a pixel to the next.
+    /// Step of `v` from a pixel to the next.
     pub dv: i32,
 }
 
@@ -107,7 +110,7 @@ impl From<Wall> for affine::Walk {
 }
 
 impl Wall {
-    /// The walk from pixel `pixels` on.
+    /// Returns the walk that starts at pixel `pixels` of this walk.
     pub(crate) fn after(self, pixels: u16) -> Self {
         Self {
             v: self.v + i32::from(pixels) * self.dv,
@@ -126,7 +129,7 @@ impl Wall {
     }
 }
 
-/// Along which axis the plane's depth is constant, if along one: columns before rows.
+/// Returns the axis along which the plane's depth is constant, if any; columns before rows.
 pub fn axis(plane: &Plane) -> Option<Axis> {
     match (plane.c.down, plane.c.right) {
         (0, _) => Some(Axis::Down),
@@ -135,10 +138,10 @@ pub fn axis(plane: &Plane) -> Option<Axis> {
     }
 }
 
-/// Gives `sink` the jobs of a face.
+/// Passes the jobs of a face to `sink`.
 ///
 /// # Errors
-/// A polygon outside the legal range; nothing of it was given to `sink`.
+/// If the polygon is outside the legal range; then `sink` has received no job.
 pub(crate) fn jobs(
     face: &Face<'_>,
     texture: &Texture<'_>,
@@ -191,7 +194,8 @@ mod tests {
             let n = random.i128(-i128::from(c)..=c.into()) * i128::from(texels);
             let n = n.clamp(-(1 << 62), 1 << 62) as i64;
             let over = Reciprocal::new(c).unwrap();
-            // In eighths of the last place: rounded down, or to nearest, and an eighth of error.
+            // In eighths of a unit in the last place: rounding down or to nearest, plus an eighth
+            // of error.
             let (eight, c) = (i128::from(n) << 19, i128::from(c));
             let off = |at: i128| 8 * at * c - eight;
             assert!((-9 * c..=c).contains(&off(over.times(n))), "{n} / {c}");

@@ -1,13 +1,14 @@
-//! Texture mapping by columns: coverage, mappers, jobs and who draws them.
+//! Texture mapping by columns: coverage, mappers, jobs, and the renderer that draws the jobs.
 //!
-//! Two steps. A [`Mapper`] makes jobs of a face: [`coverage`] says which pixels of each screen
-//! column are inside its polygon, and the mapper where the texture is at the first of them, and
-//! the steps to the next. A [`Renderer`] then draws the jobs, in one [`Order`] or another, through
-//! a [`modex::Destination`]. What draws a job sees one run of pixels; it knows neither the order of
-//! the jobs nor what lies behind the run.
+//! Drawing has two steps. First, a [`Mapper`] turns a face into jobs: [`coverage`] finds the pixels
+//! of each screen column that lie inside the face's polygon, and the mapper adds the texture
+//! coordinates at the first of these pixels and the steps to the next. Then a [`Renderer`] draws
+//! the jobs in the chosen [`Order`], through a [`modex::Destination`]. The code that draws a job
+//! sees one span of pixels; it depends neither on the order of the jobs nor on what lies behind the
+//! span.
 //!
-//! Integers decide pixels: coverage is exact, and everything else is fixed point whose range is
-//! written where the type is defined, so host and bare machine produce the same bits.
+//! Integers decide pixels: coverage is exact, and everything else is fixed point with a range that
+//! is stated where the type is defined. So the host and the bare machine produce the same bits.
 #![no_std]
 #![deny(unsafe_code)]
 

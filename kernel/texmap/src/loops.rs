@@ -1,32 +1,33 @@
-//! The affine column loops: one walk, several ways to step it.
+//! The affine column loops: several ways to step the same walk.
 //!
-//! Each takes a walk inside the texture and draws the texels of its clear twin,
-//! [`affine::column`](crate::affine::column), bit for bit; where a loop has fewer bits than the
-//! walk, the twin draws [`Loop::walk`]. On x86-64 a loop is written out in instructions; on other
-//! CPUs, and as [`Loop::portable`] everywhere, the same registers are stepped in plain Rust.
+//! Each loop draws a walk inside the texture with exactly the texels of its reference
+//! implementation, [`affine::column`](crate::affine::column). A loop with fewer bits than the walk
+//! draws the texels that the reference implementation draws for [`Loop::walk`]. On x86-64 a loop is
+//! written in assembly. On other CPUs, and in [`Loop::portable`] everywhere, plain Rust steps the
+//! same registers.
 //!
 //! # Why no loop checks what it reads
 //!
-//! A bounds check at every pixel would cost more than the step does. There are two ways around it,
-//! and both hold for any input, so that drawing a column stays safe:
+//! A bounds check at every pixel would cost more than the step. Two arguments replace it. Both hold
+//! for any input, so drawing a column stays safe:
 //!
 //! - *Checked at both ends.* [`Loop::TwoCarries`], [`Loop::Packed`], [`Loop::TwoSteps`] and
-//!   [`Loop::AddCarry`] keep an address or whole texels. The coordinates of the first pixel and of
-//!   the last are tested once for a column, as the loop steps them; a walk is linear, so that
-//!   every pixel between lies inside the texture, too. The step after the last pixel may lead out
-//!   of it, but nothing is read there. A walk that fails the test panics.
-//! - *Masked.* [`Loop::Shifts`], [`Loop::Joined`] and [`Loop::Extract`] put the index together from
-//!   as many bits of either coordinate as a padded texture has columns and rows: no index can leave
-//!   it. They draw any walk.
+//!   [`Loop::AddCarry`] keep an address or whole texels. The coordinates of the first and the last
+//!   pixel are tested once per column, as the loop steps them. A walk is linear, so every pixel
+//!   between lies inside the texture, too. The step after the last pixel may leave the texture, but
+//!   nothing is read there. A walk that fails the test panics.
+//! - *Masked.* [`Loop::Shifts`], [`Loop::Joined`] and [`Loop::Extract`] build the index from as
+//!   many bits of each coordinate as a padded texture has columns and rows, so no index can leave
+//!   the texture. They draw any walk.
 //!
-//! What is written is the column and nothing else: its length counts the stores.
+//! A loop writes the column and nothing else: the column's length counts the stores.
 //!
 //! # Wrap-around
 //!
-//! A masked loop reads column `(u >> 16) mod pitch` and row `(v >> 16) mod rows`, with pitch and
-//! rows those of the *padded* texture, and u and v wrapping at 2^32: a texture whose sides are no
-//! powers of two shows its padding. A negative step is right, because no coordinate's bits can run
-//! into the other's.
+//! A masked loop reads column `(u >> 16) mod pitch` and row `(v >> 16) mod rows`, where pitch and
+//! rows are those of the *padded* texture, and u and v wrap at 2^32. So a texture whose sides are
+//! not powers of two shows its padding. A negative step works, because no bits of one coordinate
+//! can run into the other.
 
 use modex::Column;
 
@@ -39,45 +40,46 @@ mod steps;
 #[cfg(target_arch = "x86_64")]
 mod tuned;
 
-/// Draws a column; panics as [`Loop::column`] does.
+/// A function that draws a column, and panics as [`Loop::column`] does.
 pub(crate) type Draw = fn(&Texture<'_>, &Walk, Column<'_>);
 
-/// Draws a column in linear pieces, each by a [`Draw`].
+/// A function that draws a column in linear pieces, each with a [`Draw`].
 pub(crate) type DrawLinear = fn(&Texture<'_>, &plane::Walk, runs::Pieces, Draw, Column<'_>);
 
 /// A way to step a walk down a column.
 ///
-/// Instructions are those of a pixel in a long column, on x86-64.
+/// The numbers of instructions are per pixel of a long column, on x86-64.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Loop {
-    /// The texel's index multiplied out for every pixel: the clear twin.
+    /// Computes the texel's index from scratch for every pixel: the reference implementation.
     Multiply,
-    /// An address and two fractions, each carry tested (chapter 58's first column loop). 7 to 9
-    /// instructions, 2 of them branches that texture and step make hard to foresee.
+    /// An address and two fractions, with a test of each carry (chapter 58's first column loop). 7
+    /// to 9 instructions; 2 of them are branches that texture and step make hard to predict.
     TwoCarries,
-    /// Both fractions in one register, one branch (its last). 6 to 8 instructions, and a fraction
-    /// of 15 bits down the texture: see [`Loop::walk`].
+    /// Both fractions in one register, one branch (chapter 58's last loop). 6 to 8 instructions,
+    /// and a fraction of 15 bits down the texture: see [`Loop::walk`].
     Packed,
-    /// The carry picks one of two steps, no branch (as chapter 58 guesses that John Miles did). 6
-    /// instructions.
+    /// The carry selects one of two steps, without a branch (chapter 58's guess of John Miles's
+    /// method). 6 instructions.
     TwoSteps,
-    /// Two accumulators, shifts and masks; padded textures. 10 instructions, none of which needs
-    /// a flag.
+    /// Two accumulators, shifts and masks; padded textures. 10 instructions, none of which needs a
+    /// flag.
     #[default]
     Shifts,
     /// One accumulator for both coordinates, shifts and masks; padded textures. 9 instructions.
     Joined,
-    /// Each register with the other's fraction, by add-with-carry; padded textures (Barrett's loop
-    /// without wrap-around). 6 instructions for a pitch of 256 texels, or of 8 and less; 7 or 8
-    /// between.
+    /// Each register holds one coordinate's texels and the other's fraction, stepped by
+    /// add-with-carry; padded textures (Barrett's loop without wrap-around). 6 instructions for a
+    /// pitch of 256 texels, or of at most 8; 7 or 8 instructions between.
     AddCarry,
-    /// One accumulator, the index by the CPU's bit-extract; padded textures, a CPU with BMI2. 4
-    /// instructions. (AMD's before Zen 3 have BMI2, but take the extract apart: slow there.)
+    /// One accumulator, with the CPU's bit-extract for the index; padded textures, a CPU with BMI2.
+    /// 4 instructions. (AMD's CPUs before Zen 3 have BMI2 but split the extract into many
+    /// operations: it is slow there.)
     Extract,
 }
 
 impl Loop {
-    /// All of them.
+    /// All loops.
     pub const ALL: [Self; 8] = [
         Self::Multiply,
         Self::TwoCarries,
@@ -89,7 +91,8 @@ impl Loop {
         Self::Extract,
     ];
 
-    /// Whether it is for padded textures only. Others it draws as [`Loop::Multiply`].
+    /// Returns whether the loop supports padded textures only. It draws other textures as
+    /// [`Loop::Multiply`] does.
     pub fn needs_padding(self) -> bool {
         matches!(
             self,
@@ -97,8 +100,8 @@ impl Loop {
         )
     }
 
-    /// The fastest loop for padded textures on this CPU: bit-extract where there is one, else what
-    /// is fastest under QEMU's TCG.
+    /// Returns the fastest loop for padded textures on this CPU: bit-extract if the CPU has it,
+    /// otherwise the loop that is fastest under QEMU's TCG.
     pub fn fastest() -> Self {
         match Self::Extract.is_tuned_here() {
             true => Self::Extract,
@@ -106,8 +109,8 @@ impl Loop {
         }
     }
 
-    /// Whether this CPU draws with the loop's own instructions, rather than with its portable
-    /// twin. The texels are the same.
+    /// Returns whether this CPU runs the loop's own instructions, rather than its portable version.
+    /// The texels are the same.
     pub fn is_tuned_here(self) -> bool {
         match self {
             Self::Multiply => true,
@@ -117,13 +120,13 @@ impl Loop {
         }
     }
 
-    /// The walk that the loop really takes for `walk`: at its coordinates it reads.
+    /// Returns the walk that the loop actually steps for `walk`: it reads at these coordinates.
     ///
-    /// Only [`Loop::Packed`] has fewer bits: v and its step lose their last, the step towards zero,
-    /// so that the walk stays as far inside the texture as it was. After i pixels v is off by at
-    /// most (i + 1) 2^-16 texel, over a column of n by n 2^-16, which comes on top of the walk's
-    /// own n 2^-16: together the drift of 15 bits, n 2^-15. That is less than 0.0074 over 240, and
-    /// passes 1/256 texel after 128.
+    /// Only [`Loop::Packed`] has fewer bits. It drops the last bit of v and of v's step. The step
+    /// is cut towards zero, so the walk stays as far inside the texture as before. After i pixels v
+    /// is off by at most (i + 1) 2^-16 texel, so by n 2^-16 over a column of n pixels. That adds to
+    /// the walk's own n 2^-16; together they are the drift of 15 bits, n 2^-15. It is less than
+    /// 0.0074 texel over 240 pixels, and passes 1/256 texel after 128.
     pub fn walk(self, walk: Walk) -> Walk {
         match self {
             Self::Packed => Walk {
@@ -144,8 +147,8 @@ impl Loop {
         self.draw()(texture, &walk, column);
     }
 
-    /// Draws a column with the loop's portable twin: the same registers, the same bits, on any
-    /// CPU.
+    /// Draws a column with the loop's portable version: the same registers and the same bits, on
+    /// any CPU.
     ///
     /// # Panics
     /// As [`Loop::column`].
@@ -153,7 +156,7 @@ impl Loop {
         self.draw_portably()(texture, &walk, column);
     }
 
-    /// What draws a column on this CPU: asked once for many of them.
+    /// Returns the function that draws a column on this CPU. Call this once for many columns.
     pub(crate) fn draw(self) -> Draw {
         #[cfg(target_arch = "x86_64")]
         match self {
@@ -177,8 +180,8 @@ impl Loop {
         self.draw_portably()
     }
 
-    /// What draws a column in linear pieces on this CPU. By the loops that are the fastest for
-    /// padded textures the pieces are drawn in place, by the others with [`Loop::draw`].
+    /// Returns the function that draws a column in linear pieces on this CPU. The fastest loops for
+    /// padded textures draw the pieces in place; the others use [`Loop::draw`].
     pub(crate) fn draw_linear(self) -> DrawLinear {
         #[cfg(target_arch = "x86_64")]
         match self {
@@ -201,8 +204,9 @@ impl Loop {
         }
     }
 
-    /// Puts the texels of a walk along a row, which are any loop's, into their places; `extract`
-    /// tells whether by the instructions of [`Loop::Extract`], which the CPU must have.
+    /// Writes the texels of a walk along a row, which are the same for every loop, to `places`.
+    /// `extract` says whether to use the instructions of [`Loop::Extract`], which the CPU must
+    /// have.
     #[inline(always)]
     pub(crate) fn along(texture: &Texture<'_>, mut walk: Walk, extract: bool, places: impl Part) {
         let texels = texture.texels();

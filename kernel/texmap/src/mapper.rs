@@ -1,4 +1,4 @@
-//! Every way to map a texture, by name, and the jobs that it makes of a face.
+//! The mappers by name, and the jobs that each makes of a face.
 
 use core::fmt;
 
@@ -11,12 +11,12 @@ use crate::runs::Pieces;
 use crate::within::{Tolerance, Within};
 use crate::{Texture, Vertex, free, level, tiles};
 
-/// A face on the screen, as the mappers need it.
+/// A face on the screen, with everything that the mappers need.
 #[derive(Clone, Copy, Debug)]
 pub struct Face<'p> {
-    /// Its snapped corners.
+    /// The face's snapped corners.
     pub polygon: &'p [Vertex],
-    /// Which of the scene's textures.
+    /// Index of the texture among the scene's textures.
     pub texture: u16,
     /// Three points of the texture's plane.
     pub anchors: [Anchor; 3],
@@ -25,7 +25,7 @@ pub struct Face<'p> {
 }
 
 impl Face<'_> {
-    /// The texture's plane.
+    /// Returns the texture's plane.
     pub fn plane(&self) -> Plane {
         Plane::new(&self.anchors, self.focal_length)
     }
@@ -34,7 +34,7 @@ impl Face<'_> {
 /// A way to map a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mapper {
-    /// Affine rows, by chapter 57's half steps.
+    /// Affine rows by chapter 57's half steps.
     Rows(Rows),
     /// Affine columns, interpolated exactly between the polygon's sides.
     Affine(Loop),
@@ -42,27 +42,28 @@ pub enum Mapper {
     HalfStep,
     /// A quotient for every pixel.
     Exact,
-    /// Affine from exact ends, linear pieces in each column.
+    /// Perspective: linear pieces between exact ends, in each column.
     Linear(Pieces),
-    /// Quadratic pieces in each column.
+    /// Perspective: quadratic pieces in each column.
     Quadratic(Pieces),
-    /// Linear pieces of 16 pixels, in columns or rows by which changes its depth less.
+    /// Linear pieces of 16 pixels, along columns or rows, whichever direction changes the depth
+    /// less.
     Nearer,
     /// Affine in tiles of 16 x 16 pixels.
     Tiles,
     /// Affine along lines of constant depth, in any direction.
     Free,
-    /// Affine where a column or row has one depth, otherwise exact.
+    /// Affine where a column or row has constant depth, otherwise exact.
     Level,
-    /// For every polygon and run the cheapest way that keeps to an error.
+    /// The cheapest way that keeps to an error, for every polygon and span.
     Within(Tolerance),
 }
 
-/// A mapper's name, the mapper, and a line about it.
+/// A mapper's name, the mapper, and a line of description.
 type Named = (&'static str, Mapper, &'static str);
 
 impl Mapper {
-    /// Every mapper with its name and a line for people, from the seeds' first to the exact.
+    /// Every mapper with its name and a line of description, from the sources' first to the exact.
     pub const ALL: &'static [Named] = &[
         (
             "row-multiply",
@@ -221,7 +222,7 @@ impl Mapper {
         ),
     ];
 
-    /// The mapper of a name; `within-` takes any [`Tolerance`].
+    /// Returns the mapper with this name, if any. `within-` may be followed by any [`Tolerance`].
     pub fn parse(name: &str) -> Option<Self> {
         if let Some(tolerance) = name.strip_prefix("within-") {
             return Tolerance::parse(tolerance).map(Self::Within);
@@ -230,14 +231,16 @@ impl Mapper {
         named.map(|&(_, mapper, _)| mapper)
     }
 
-    /// Its name in [`Mapper::ALL`]; empty for a tolerance that is not there. All are displayed.
+    /// Returns the mapper's name in [`Mapper::ALL`], or an empty string for a tolerance that is not
+    /// listed there. `Display` writes the names of all mappers.
     pub fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(_, mapper, _)| *mapper == self);
         named.map_or("", |(name, ..)| name)
     }
 
-    /// A faster one that may be further off, for what moves: an error that was chosen becomes two
-    /// texels at least, and what is nearly exact is drawn in linear pieces. Others have none.
+    /// Returns a faster, less accurate mapper for objects in motion, or `None` if no such mapper
+    /// exists. A tolerance below two texels becomes two texels, and an exact or nearly exact mapper
+    /// becomes linear pieces.
     pub fn lower(self) -> Option<Self> {
         const UNSEEN: Tolerance = Tolerance::new(2, 1).expect("two texels are legal");
         match self {
@@ -249,7 +252,7 @@ impl Mapper {
         }
     }
 
-    /// How its runs are drawn.
+    /// Returns the style in which the mapper's spans are drawn.
     pub fn style(self) -> Style {
         let mut style = Style {
             affine: Loop::fastest(),
@@ -263,10 +266,10 @@ impl Mapper {
         style
     }
 
-    /// Gives `sink` the jobs that draw a face with `texture`.
+    /// Passes the jobs that draw a face with `texture` to `sink`.
     ///
     /// # Errors
-    /// A polygon outside the legal range; nothing of it was given to `sink`.
+    /// If the polygon is outside the legal range; then `sink` has received no job.
     pub fn jobs(
         self,
         face: &Face<'_>,
@@ -276,7 +279,8 @@ impl Mapper {
         self.make_jobs(face, texture, &mut sink)
     }
 
-    /// The same, once in a program: by what draws them it would be there ten times.
+    /// Makes the jobs through a dynamic `sink`, so that a program has this code once. Generic over
+    /// `sink`, it would have ten copies.
     fn make_jobs(
         self,
         face: &Face<'_>,
@@ -323,7 +327,8 @@ impl Mapper {
         let mut by_sides = |axis, rule: fn(&Sides, &Run) -> affine::Walk| {
             let sides = Sides::new(polygon, texture, axis)?;
             runs(axis, polygon, |run| {
-                // The job has the walk that is drawn: its clear twin knows no loops.
+                // The job holds the walk that is actually drawn: its reference implementation does
+                // not know the loops.
                 let walk = drawn_by.walk(rule(&sides, &run));
                 add(axis, run.line, run.first, run.len, Walk::Affine(walk));
             })
@@ -356,7 +361,7 @@ impl Mapper {
     }
 }
 
-/// What the measurements recommend in QEMU.
+/// The mapper that the measurements recommend in QEMU.
 impl Default for Mapper {
     fn default() -> Self {
         Self::Affine(Loop::default())
@@ -376,7 +381,7 @@ impl fmt::Display for Mapper {
 mod tests {
     use super::*;
 
-    /// Jobs of either may stand in one list.
+    /// One list may hold jobs of both mappers.
     #[test]
     fn what_is_lower_is_drawn_by_the_same_loops_and_no_lower_again() {
         let mut some = 0;

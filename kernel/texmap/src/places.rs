@@ -1,5 +1,5 @@
-//! Where a run's texels go, one after the other: down a column, into every fourth pixel of a row,
-//! or into each of them.
+//! Pixel sinks: the places that receive a span's texels, one after the other. They lie down a
+//! column, at every fourth pixel of a row, or at every pixel of a row.
 
 use modex::{Column, Lane, Line};
 
@@ -8,29 +8,29 @@ use crate::job::Tools;
 use crate::loops::Loop;
 use crate::{Texture, exact, plane};
 
-/// The places of a run's texels.
+/// The places of a span's texels.
 pub(crate) trait Places {
-    /// Some of them.
+    /// A part of the places.
     type Part<'p>: Part
     where
         Self: 'p;
 
-    /// The `count` places from `first` on.
+    /// Returns the `count` places from `first` on.
     fn part(&mut self, first: u16, count: u16) -> Self::Part<'_>;
 }
 
-/// Places that are to be filled.
+/// Places to be filled.
 pub(crate) trait Part: Sized {
-    /// Puts a texel into every place, in order; `texel` is called once for each.
+    /// Writes a texel to every place, in order; `texel` is called once for each.
     fn fill(self, texel: impl FnMut() -> u8);
 
-    /// Puts the texels of an affine walk there.
+    /// Writes the texels of an affine walk.
     #[inline(always)]
     fn affine(self, texture: &Texture<'_>, walk: Walk, tools: &Tools) {
         Loop::along(texture, walk, tools.extract, self);
     }
 
-    /// Puts the texels of the quotients there.
+    /// Writes the texels of the quotients.
     #[inline(always)]
     fn exact(self, texture: &Texture<'_>, mut walk: plane::Walk) {
         self.fill(|| exact::texel(texture, walk.next()));
@@ -110,7 +110,8 @@ impl Part for RowPart<'_, '_> {
     #[inline(always)]
     fn fill(self, mut texel: impl FnMut() -> u8) {
         let Self { line, first, end } = self;
-        // Four pixels with the same address at once; before and behind them one by one.
+        // Write groups of four pixels with the same address, and the pixels before and after them
+        // one by one.
         let (from, to) = (first.div_ceil(4), end / 4);
         for x in first..end.min(4 * from) {
             line[x & 3][x / 4] = texel();

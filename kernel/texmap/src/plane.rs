@@ -1,98 +1,101 @@
-//! A texture's plane in space, as three linear forms of the screen.
+//! The perspective plane: a texture's plane in space, as three linear forms of the screen.
 //!
-//! A polygon's texture lies in the plane P + uM + vN of the viewer's space. The ray through a
-//! pixel is t d with d = (i, j, f): the pixel's place from the middle of the screen, and the focal
-//! length. Where they meet, t d = P + uM + vN, and eliminating two unknowns at a time leaves
+//! A polygon's texture lies in the plane P + u M + v N of the viewer's space, where P is the
+//! texture's origin and M and N are its axes. The ray through a pixel is t d with d = (i, j, f):
+//! (i, j) is the pixel's position relative to the middle of the screen, and f is the focal length.
+//! The ray meets the plane where t d = P + u M + v N. Eliminating two unknowns at a time gives
 //!
 //! ```text
 //! u = a / c    v = b / c    a = d . (N x P)    b = d . (P x M)    c = d . (M x N)
 //! ```
 //!
-//! which are linear in i and j. P, M and N need not be found at all. With three points V of the
-//! plane and their texture coordinates, and L = d . (V' x V'') for each point and the two after it,
-//! the same three forms are, but for a factor that the quotients do not see,
+//! The three forms a, b and c are linear in i and j. They can be computed without P, M and N. Take
+//! three points V of the plane with their texture coordinates, and for each point V let
+//! L = d . (V' x V''), where V' and V'' are the two points that follow V in cyclic order. L is
+//! proportional to the weight of V at the point where the ray meets the plane, so
 //!
 //! ```text
 //! a = sum of u L    b = sum of v L    c = sum of L
 //! ```
 //!
-//! for L is the weight of its point where the ray meets the plane. This needs no division, and
-//! nothing in it is special when the texture's own axes are.
+//! are the same three forms up to a common factor, which cancels in the quotients. These sums need
+//! no division, and texture axes in special directions need no special case.
 //!
 //! # The integers
 //!
-//! The sums are exact: below 2^92 for points within [`MAX_POSITION`]. They are then cut to 61 bits
-//! once, by one shift for all nine coefficients, each rounded to nearest (half up). A form's value
-//! is off by at most [`ROUNDING`] then. From here on there is no rounding: the texel *is* the floor
-//! of the quotient of those integers.
+//! The sums are exact: below 2^92 for points within [`MAX_POSITION`]. One shift, common to all nine
+//! coefficients, then reduces them to 61 bits, and each coefficient is rounded to nearest (half
+//! up). That moves a form's value by at most [`ROUNDING`]. Nothing is rounded after that: the texel
+//! *is* the floor of the quotient of those integers.
 
 use modex::{HEIGHT, WIDTH};
 
 use crate::coverage::Axis;
 
-/// Furthest coordinate of a point, either sign: 256 units in 16.16.
+/// Largest magnitude of a point's coordinate: 256 units in 16.16.
 pub const MAX_POSITION: i32 = 1 << 24;
 /// Largest focal length in pixels.
 pub const MAX_FOCAL_LENGTH: i32 = 1 << 15;
 /// Most that rounding the coefficients moves a form's value, in units of its last place: half a
-/// unit for the origin, and for each step to the right and down.
+/// unit for the origin, and half a unit for each step to the right and down.
 pub const ROUNDING: i64 = (WIDTH + HEIGHT).div_ceil(2) as i64;
 
-/// Bits of a form's value on the screen. A value and 256 times another's are compared, and their
-/// difference fits 63 bits.
+/// Bits of a form's value on the screen. [`texel`] compares one value with 256 times another, and
+/// the difference of the two fits 63 bits.
 const BITS: u32 = 61;
 
-/// A point of the plane with its place in the texture.
+/// A point of the plane and its texture coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Anchor {
-    /// In the viewer's space: x right, y down, z away, 16.16, within +-[`MAX_POSITION`].
+    /// Position in the viewer's space: x right, y down, z away from the eye; 16.16, within
+    /// +-[`MAX_POSITION`].
     pub position: [i32; 3],
-    /// Across the texture, 16.16 texels, 0 to 256.
+    /// Coordinate across the texture: 16.16 texels, 0 to 256.
     pub u: i32,
-    /// Down the texture, 16.16 texels, 0 to 256.
+    /// Coordinate down the texture: 16.16 texels, 0 to 256.
     pub v: i32,
 }
 
-/// A linear form of the screen: its value at a pixel's centre.
+/// A linear form of the screen: a value at every pixel's centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Form {
-    /// At the centre of pixel (0, 0).
+    /// Value at the centre of pixel (0, 0).
     pub origin: i64,
-    /// From a pixel to the one right of it.
+    /// Change from a pixel to the pixel on its right.
     pub right: i64,
-    /// From a pixel to the one below it.
+    /// Change from a pixel to the pixel below it.
     pub down: i64,
 }
 
 impl Form {
-    /// The value at the centre of a pixel of the screen.
+    /// Returns the value at the centre of pixel (x, y) of the screen.
     pub fn at(&self, x: u16, y: u16) -> i64 {
         self.origin + self.right * i64::from(x) + self.down * i64::from(y)
     }
 }
 
-/// The three forms: u = a / c and v = b / c, in texels.
+/// The three forms of a texture's plane: u = a / c and v = b / c, in texels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Plane {
     /// Numerator of u.
     pub a: Form,
     /// Numerator of v.
     pub b: Form,
-    /// Their denominator; above zero where the plane lies before the eye.
+    /// Common denominator; above zero where the plane is in front of the eye.
     pub c: Form,
 }
 
-/// The three forms of a plane along a run of pixels.
+/// The three forms of a plane along a span of pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Walk {
     /// a, b and c at the first pixel's centre.
     pub at: [i64; 3],
-    /// Their steps from a pixel to the next.
+    /// Steps of a, b and c from a pixel to the next.
     pub step: [i64; 3],
 }
 
 impl Walk {
-    /// Along `axis` from pixel (x, y) of the screen.
+    /// Returns the walk along `axis` from pixel (x, y) of the screen.
     pub fn new(plane: &Plane, axis: Axis, x: u16, y: u16) -> Self {
         let forms = [plane.a, plane.b, plane.c];
         Self {
@@ -104,12 +107,12 @@ impl Walk {
         }
     }
 
-    /// The forms `pixels` after the first.
+    /// Returns a, b and c at `pixels` pixels after the first.
     pub fn after(&self, pixels: u16) -> [i64; 3] {
         [0, 1, 2].map(|k| self.at[k] + self.step[k] * i64::from(pixels))
     }
 
-    /// The walk from pixel `pixels` of this one on, in steps of `stride` pixels.
+    /// Returns the walk that starts at pixel `pixels` of this walk and steps by `stride` pixels.
     pub(crate) fn every(&self, stride: u16, pixels: u16) -> Self {
         Self {
             at: self.after(pixels),
@@ -117,38 +120,39 @@ impl Walk {
         }
     }
 
-    /// The forms here; then it is a pixel further.
+    /// Returns the forms at the current pixel, and steps to the next pixel.
     pub(crate) fn next(&mut self) -> [i64; 3] {
         let here = self.at;
-        // Past the run's end at most by one: a step is below 2^55.
+        // This steps at most one pixel past the span's end, and a step is below 2^55: no overflow.
         self.at = self.after(1);
         here
     }
 }
 
-/// A form before it is cut: at pixel (0, 0), and the steps to the right and down.
+/// A form before it is reduced to [`BITS`]: its value at pixel (0, 0), and its steps to the right
+/// and down.
 pub(crate) type Exact = [i128; 3];
 
 impl Plane {
-    /// The plane through three points.
+    /// Returns the plane through three points.
     ///
-    /// Three points on a line, or a plane through the eye, give forms as well: what is seen of
-    /// such a polygon is decided by [`texel`], as everywhere.
+    /// Three points on a line, or a plane through the eye, also yield forms. [`texel`] then decides
+    /// what such a polygon shows, as it does everywhere.
     ///
     /// # Panics
     /// In a build with overflow checks, if a position or the focal length is out of its range.
     pub fn new(anchors: &[Anchor; 3], focal_length: i32) -> Self {
-        // Positions have 24 bits, what is made of two of them 50: only their sums need more than
-        // 64.
+        // Positions have 24 bits and the cross products of two positions have 50: only the sums of
+        // products below need more than 64.
         let [v0, v1, v2] = anchors.map(|anchor| anchor.position.map(i64::from));
         let mut weights = [cross(v1, v2), cross(v2, v0), cross(v0, v1)];
-        // The sign of the volume is that of c before the eye.
+        // The sign of this volume is the sign of c in front of the eye.
         if dot(v0, weights[0]) < 0 {
             weights = weights.map(|weight| weight.map(|k| -k));
         }
         let [x, y, z] = [0, 1, 2].map(|k| weights.map(|weight| weight[k]));
         let [u, v] = [anchors.map(|a| a.u.into()), anchors.map(|a| a.v.into())];
-        // c has the sixteen bits that u and v bring into a and b.
+        // c gets the same 16 fraction bits that u and v bring into a and b.
         let one = [1 << 16; 3];
         let a = [dot(u, x), dot(u, y), dot(u, z)];
         let b = [dot(v, x), dot(v, y), dot(v, z)];
@@ -172,11 +176,12 @@ impl Plane {
     }
 }
 
-/// The texel of a coordinate whose quotient is `n / c`: its floor, in a texture of `size` texels.
-/// Outside of it the nearest; on the horizon and beyond, where c is not above zero, the one that
-/// the last pixels before it come to.
+/// Returns the texel index of the coordinate n / c: its floor, in a texture of `size` texels.
 ///
-/// `size` is at most 256, and the values are those of a [`Plane`]'s forms on the screen.
+/// Outside the texture, returns the nearest texel. On and beyond the horizon, where c is not above
+/// zero, returns the texel that the last pixels before the horizon approach.
+///
+/// `size` is at most 256, and `n` and `c` are values of a [`Plane`]'s forms on the screen.
 pub fn texel(n: i64, c: i64, size: u16) -> u16 {
     let size = i64::from(size);
     if n < 0 {
@@ -188,8 +193,8 @@ pub fn texel(n: i64, c: i64, size: u16) -> u16 {
     }
 }
 
-/// The coordinate n / c in a texture of `size` texels, 16.16 and rounded down, inside the texture
-/// as [`texel`] is.
+/// Returns the coordinate n / c in a texture of `size` texels: 16.16, rounded down, and clamped
+/// into the texture as in [`texel`].
 pub fn coordinate(n: i64, c: i64, size: u16) -> i32 {
     let last = (i64::from(size) << 16) - 1;
     if n < 0 {
@@ -214,8 +219,9 @@ fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
     ]
 }
 
-/// `vector . d` as a form. The centre of pixel (x, y) is at (x + 1/2, y + 1/2), and the middle of
-/// the screen is the corner between four pixels: twice d is whole.
+/// Returns `vector . d` as a form. The centre of pixel (x, y) is at (x + 1/2, y + 1/2), and the
+/// middle of the screen is the corner between four pixels, so i and j are odd multiples of 1/2. The
+/// form is doubled to keep it whole.
 #[inline(always)]
 pub(crate) fn on_screen(vector: [i128; 3], focal_length: i32) -> Exact {
     let [i, j, k] = vector;
@@ -227,8 +233,8 @@ pub(crate) fn on_screen(vector: [i128; 3], focal_length: i32) -> Exact {
     ]
 }
 
-/// The largest magnitude of `vector . d` on the screen, that of a corner: twice it is what the
-/// middle has, and what it changes by from there to the last centres.
+/// Returns twice the largest magnitude of `vector . d` on the screen, which a corner pixel reaches:
+/// the magnitude at the middle plus the magnitudes of the changes from there to the last centres.
 #[inline(always)]
 fn largest([i, j, k]: [i128; 3], focal_length: i32) -> u128 {
     let middle = 2 * i128::from(focal_length) * k;
@@ -236,7 +242,8 @@ fn largest([i, j, k]: [i128; 3], focal_length: i32) -> u128 {
     middle.unsigned_abs() + right.unsigned_abs() + down.unsigned_abs()
 }
 
-/// `n / 2^shift`, rounded to nearest, half up; `shift` is below 64, and the compiler is told so.
+/// Returns `n / 2^shift`, rounded to nearest, half up. `shift` is below 64; `shift % 64` lets the
+/// compiler rely on that.
 #[inline(always)]
 fn cut(n: i128, shift: u32) -> i64 {
     let half = (1u64 << shift) >> 1;

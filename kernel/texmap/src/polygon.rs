@@ -1,11 +1,11 @@
-//! What goes into the mapper: vertices and textures.
+//! The input of the mapper: vertices and textures.
 
 use core::fmt;
 
-/// Positions are whole multiples of 1/256 pixel.
+/// Units of a position per pixel: positions are whole multiples of 1/256 pixel.
 pub const SUBPIXELS: i32 = 256;
-/// Largest x or y of a vertex, either sign: 32 767 pixels. Within it every product of the scan
-/// fits 64 bits.
+/// Largest magnitude of a vertex's x or y: 32 767 pixels. Within it, every product of the scan fits
+/// 64 bits.
 pub const MAX_COORDINATE: i32 = 32_767 * SUBPIXELS;
 /// Most sides of a polygon.
 pub const MAX_SIDES: usize = 16;
@@ -13,9 +13,9 @@ pub const MAX_SIDES: usize = 16;
 /// A place on the screen. Pixel (x, y) has its centre at (256 x + 128, 256 y + 128).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Point {
-    /// Right, in 1/256 pixel, within +-[`MAX_COORDINATE`].
+    /// Position to the right, in 1/256 pixel, within +-[`MAX_COORDINATE`].
     pub x: i32,
-    /// Down, in 1/256 pixel, within +-[`MAX_COORDINATE`].
+    /// Position downward, in 1/256 pixel, within +-[`MAX_COORDINATE`].
     pub y: i32,
 }
 
@@ -28,25 +28,25 @@ impl From<Vertex> for Point {
     }
 }
 
-/// A corner of a polygon on the screen, placed as a [`Point`], and in its texture.
+/// A corner of a polygon: its place on the screen, as in [`Point`], and its texture coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Vertex {
-    /// Right, in 1/256 pixel, within +-[`MAX_COORDINATE`].
+    /// Position to the right, in 1/256 pixel, within +-[`MAX_COORDINATE`].
     pub x: i32,
-    /// Down, in 1/256 pixel, within +-[`MAX_COORDINATE`].
+    /// Position downward, in 1/256 pixel, within +-[`MAX_COORDINATE`].
     pub y: i32,
-    /// Across the texture, 16.16 texels, 0 to its width.
+    /// Coordinate across the texture: 16.16 texels, 0 to its width.
     pub u: i32,
-    /// Down the texture, 16.16 texels, 0 to its height.
+    /// Coordinate down the texture: 16.16 texels, 0 to its height.
     pub v: i32,
 }
 
 /// A rectangle of texels, row by row. Texel (i, j) covers [i, i + 1) x [j, j + 1).
 ///
 /// The rows lie `pitch` texels apart. In a *padded* texture the pitch and the number of rows are
-/// powers of two: an index put together from masked coordinates can't leave it. A *tiled* one is a
-/// rectangle laid out of one tile, of which alone there are texels: whatever is said of coordinates
-/// in a texture is said of the rectangle, and only the index wraps around.
+/// powers of two, so an index made of masked coordinates cannot leave the texture. A *tiled*
+/// texture is a rectangle that repeats one tile, and only the tile's texels are stored. Every
+/// statement about coordinates in a texture refers to the rectangle; only the index wraps around.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     texels: &'a [u8],
@@ -56,11 +56,11 @@ pub struct Texture<'a> {
     is_padded: bool,
     /// See [`Texture::masks`].
     masks: u64,
-    /// Those bits of a column's number and of a row's that are the tile's.
+    /// Masks that keep the tile's bits of a column's number and of a row's.
     wrap: (u16, u16),
 }
 
-/// Why a texture can't be one.
+/// The reason why texels and sides do not make a texture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TextureError {
     /// A side is not 1 to 256 texels.
@@ -70,9 +70,9 @@ pub enum TextureError {
         /// Texels down.
         height: u16,
     },
-    /// The slice does not hold as many texels.
+    /// The slice's length is not the texture's number of texels.
     Length {
-        /// What the texture has.
+        /// The texture's number of texels.
         expected: usize,
         /// The slice's length.
         actual: usize,
@@ -109,35 +109,35 @@ impl<'a> Texture<'a> {
         masks: 0,
         wrap: Self::WHOLE,
     };
-    /// What [`Texture::wrap`] is where nothing wraps.
+    /// The value of [`Texture::wrap`] when nothing wraps.
     const WHOLE: (u16, u16) = (u16::MAX, u16::MAX);
 
-    /// A texture of `width` x `height` texels.
+    /// Returns a texture of `width` x `height` texels.
     ///
     /// # Errors
-    /// A side outside 1 to 256, or a slice of another length.
+    /// If a side is outside 1 to 256, or the slice has another length.
     pub fn new(texels: &'a [u8], width: u16, height: u16) -> Result<Self, TextureError> {
         Self::with_rows(texels, width, height, width, height)
     }
 
-    /// A padded texture of `width` x `height` texels: `texels` has [`Texture::padded_len`] of them,
-    /// in rows of the next power of two. What lies beyond `width` or `height` is never drawn.
+    /// Returns a padded texture of `width` x `height` texels. `texels` has [`Texture::padded_len`]
+    /// texels, in rows of the next power of two. Texels beyond `width` or `height` are never drawn.
     ///
     /// # Errors
-    /// A side outside 1 to 256, or a slice of another length.
+    /// If a side is outside 1 to 256, or the slice has another length.
     pub fn padded(texels: &'a [u8], width: u16, height: u16) -> Result<Self, TextureError> {
         let [pitch, rows] = [width, height].map(|k| k.min(Self::MAX_SIDE).next_power_of_two());
         Self::with_rows(texels, width, height, pitch, rows)
     }
 
-    /// A texture of `width` x `height` texels, laid out of a tile of `tile.0` x `tile.1`, whose
-    /// `texels` are given. The tile's sides are powers of two.
+    /// Returns a texture of `width` x `height` texels that repeats a tile of `tile.0` x `tile.1`
+    /// texels; `texels` has the tile's. The tile's sides must be powers of two.
     ///
     /// # Errors
-    /// A side outside 1 to 256, or a slice of another length.
+    /// If a side is outside 1 to 256, or the slice has another length.
     ///
     /// # Panics
-    /// If a side of the tile is no power of two.
+    /// If a side of the tile is not a power of two.
     pub fn tiled(
         texels: &'a [u8],
         tile: (u16, u16),
@@ -156,13 +156,13 @@ impl<'a> Texture<'a> {
         })
     }
 
-    /// The sides of the tile that a tiled texture is laid out of.
+    /// Returns the sides of a tiled texture's tile, or nothing for other textures.
     pub fn tile(&self) -> Option<(u16, u16)> {
         let (column, row) = self.wrap;
         (self.wrap != Self::WHOLE).then(|| (column + 1, row + 1))
     }
 
-    /// Texels of a padded texture.
+    /// Returns the number of texels of a padded texture, with its padding.
     pub fn padded_len(width: u16, height: u16) -> usize {
         let [pitch, rows] = [width, height].map(|k| usize::from(k).next_power_of_two());
         pitch * rows
@@ -193,34 +193,36 @@ impl<'a> Texture<'a> {
         })
     }
 
-    /// Texels from a row to the next.
+    /// Returns the distance from a row to the next, in texels.
     pub fn pitch(&self) -> u16 {
         self.pitch
     }
 
-    /// In a padded texture, the bits of a column's number and of a row's.
+    /// Returns the bits of a column's number and of a row's in a padded texture, or nothing for
+    /// other textures.
     pub fn bits(&self) -> Option<(u32, u32)> {
         let columns = self.pitch.trailing_zeros();
         self.is_padded
             .then(|| (columns, self.texels.len().trailing_zeros() - columns))
     }
 
-    /// In a padded texture, which bits of coordinates make the index: the column's are bits 16 and
-    /// up of u; the row's go on from them, 32 bits higher, in v times the pitch.
+    /// Returns a mask of the coordinates' bits that make the index in a padded texture. The
+    /// column's bits are bits 16 and up of u. The row's bits continue them, 32 bits higher, in v
+    /// times the pitch.
     ///
-    /// Asked for every column, and therefore made with the texture.
+    /// Needed for every column, and therefore computed with the texture.
     #[inline]
     pub(crate) fn masks(&self) -> Option<u64> {
         self.is_padded.then_some(self.masks)
     }
 
-    /// The texel at coordinates inside the texture, 16.16.
+    /// Returns the texel at coordinates inside the texture, 16.16.
     #[inline]
     pub fn at(&self, u: i32, v: i32) -> u8 {
         self.texel((u >> 16) as usize, (v >> 16) as usize)
     }
 
-    /// The texel in a column and a row of the texture.
+    /// Returns the texel in a column and a row of the texture.
     #[inline(always)]
     pub(crate) fn texel(&self, column: usize, row: usize) -> u8 {
         let (wrap_column, wrap_row) = self.wrap;
@@ -228,23 +230,23 @@ impl<'a> Texture<'a> {
         self.texels[row * usize::from(self.pitch) + (column & usize::from(wrap_column))]
     }
 
-    /// The texels, row by row, `pitch` apart; of a tiled texture the tile's.
+    /// Returns the texels, in rows that lie `pitch` apart; in a tiled texture, the tile's texels.
     pub fn texels(&self) -> &'a [u8] {
         self.texels
     }
 
-    /// Texels across, 1 to 256.
+    /// Returns the number of texels across, 1 to 256.
     pub fn width(&self) -> u16 {
         (self.last.0 >> 16) as u16 + 1
     }
 
-    /// Texels down, 1 to 256.
+    /// Returns the number of texels down, 1 to 256.
     pub fn height(&self) -> u16 {
         (self.last.1 >> 16) as u16 + 1
     }
 
-    /// The last coordinate inside, 16.16: the last texel owns the far border, so u = width
-    /// reads texel width - 1.
+    /// Returns the last coordinates inside the texture, 16.16. The last texel owns the far border,
+    /// so u = width reads texel width - 1.
     #[inline]
     pub fn last(&self) -> (i32, i32) {
         self.last

@@ -1,4 +1,4 @@
-//! From polygons to pixels: jobs are collected, then drawn.
+//! The renderer: it collects jobs, then draws them.
 
 use core::fmt;
 
@@ -8,36 +8,38 @@ use crate::coverage::{Dropped, check};
 use crate::mapper::{Face, Mapper};
 use crate::{Job, JobList, Texture, Visible};
 
-/// What was drawn, and what was not.
+/// Counts of what was drawn, and of what was not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Stats {
-    /// Polygons that were drawn (also those that cover no pixel).
+    /// Polygons that were drawn, including those that cover no pixel.
     pub polygons: u32,
-    /// Runs drawn: columns, with most mappers.
+    /// Spans drawn; with most mappers these are columns.
     pub columns: u32,
     /// Pixels drawn.
     pub pixels: u32,
-    /// Polygons outside the legal range, not drawn.
+    /// Polygons outside the legal range, which were not drawn.
     pub dropped: u32,
-    /// Times that the job list was full and had to be drawn before the picture was complete.
+    /// The number of times that the job list was full and had to be drawn before the frame was
+    /// complete.
     pub full: u32,
 }
 
-/// In which order jobs are drawn.
+/// The order in which jobs are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Order {
-    /// As the polygons come, a plane selected for each column.
+    /// Polygon by polygon; selects a plane for each column.
     #[default]
     Polygons,
-    /// All of plane 0, then of 1, 2 and 3: a plane is selected four times a list.
+    /// All of plane 0, then planes 1, 2 and 3; selects a plane four times per list.
     Planes,
-    /// The same, into a page in RAM that is then presented in wide stores; if any run of a list
-    /// leaves its column, as the polygons come. What is drawn on is the caller's to choose.
+    /// Plane by plane into a page in RAM, which is then presented in wide stores. If any span of a
+    /// list leaves its column, the list is drawn polygon by polygon. The caller has to supply the
+    /// page as the destination.
     Buffer,
 }
 
 impl Order {
-    /// Every order with its name and a line for people.
+    /// Every order with its name and a line of description.
     pub const ALL: [(&'static str, Self, &'static str); 3] = [
         (
             "polygons",
@@ -56,22 +58,22 @@ impl Order {
         ),
     ];
 
-    /// The order of a name.
+    /// Returns the order with this name, if any.
     pub fn parse(name: &str) -> Option<Self> {
         let named = Self::ALL.iter().find(|(known, ..)| *known == name);
         named.map(|&(_, order, _)| order)
     }
 
-    /// Its name.
+    /// Returns the order's name.
     pub fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(_, order, _)| *order == self);
         named.map_or("", |(name, ..)| name)
     }
 
-    /// Draws jobs that `mapper` made, each with the texture that it names.
+    /// Draws jobs that `mapper` made, each with the texture that it refers to.
     ///
     /// # Panics
-    /// If there is no such texture.
+    /// If a job refers to a texture that does not exist.
     pub fn draw<D: Destination, const N: usize>(
         self,
         jobs: &mut JobList<N>,
@@ -80,7 +82,7 @@ impl Order {
         mapper: Mapper,
     ) {
         let tools = mapper.style().tools();
-        // In RAM all planes can be reached at once, and a row is drawn whole.
+        // RAM needs no selected plane, so a row can be drawn whole.
         let as_they_come = self == Self::Polygons || self == Self::Buffer && jobs.leaves_columns();
         match as_they_come {
             true => {
@@ -121,7 +123,7 @@ pub struct Renderer<'a, D, const N: usize> {
 }
 
 impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
-    /// A renderer for one picture; whatever was in `jobs` is forgotten.
+    /// Returns a renderer for one frame, and empties `jobs`.
     pub fn new(
         jobs: &'a mut JobList<N>,
         textures: &'a [Texture<'a>],
@@ -143,18 +145,18 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
     /// Adds a face with the texture `textures[face.texture]`.
     ///
     /// # Panics
-    /// If there is no such texture.
+    /// If that texture does not exist.
     pub fn face(&mut self, face: &Face<'_>) {
         let texture = &self.textures[usize::from(face.texture)];
         let mapped = self.mapper.jobs(face, texture, |job| self.add(job));
         self.count(mapped);
     }
 
-    /// Adds a face as [`Renderer::face`] does, where `visible`, which knows it by `number`, says
-    /// that it is seen.
+    /// Adds a face as [`Renderer::face`] does, but only its parts that are visible according to
+    /// `visible`, which knows the face by `number`.
     ///
     /// # Panics
-    /// If there is no such texture.
+    /// If the texture `textures[face.texture]` does not exist.
     pub fn seen_face<const FACES: usize>(
         &mut self,
         face: &Face<'_>,
@@ -166,20 +168,21 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
             true => self.mapper.jobs(face, texture, |job| {
                 visible.cut(number, &job, |part| self.add(part));
             }),
-            // It needs no job, and whether it could have had any is told all the same.
+            // A hidden face needs no jobs, but a face outside the legal range still has to be
+            // counted.
             false => check(face.polygon),
         };
         self.count(mapped);
     }
 
-    /// Adds a job, to an empty list if it has to be.
+    /// Adds a job. If the list is full, draws and empties it first.
     fn add(&mut self, job: Job) {
         self.stats.columns += 1;
         self.stats.pixels += u32::from(job.len);
         if let Err(job) = self.jobs.push(job) {
             self.stats.full += 1;
             self.draw();
-            // A list that was just emptied takes the job: N is not zero.
+            // The list was just emptied and N is not zero, so there is room.
             let _ = self.jobs.push(job);
         }
     }
@@ -191,10 +194,10 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
         }
     }
 
-    /// Has the next faces mapped in another way.
+    /// Sets the mapper of the following faces.
     ///
     /// # Panics
-    /// If the other mapper's runs are drawn by other loops: those in the list are drawn together.
+    /// If the new mapper's spans are drawn by other loops: all jobs in the list are drawn together.
     pub fn set_mapper(&mut self, mapper: Mapper) {
         if mapper == self.mapper {
             return;
@@ -208,12 +211,12 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
         self.mapper = mapper;
     }
 
-    /// Counts a face that could not even be placed on the screen.
+    /// Counts a face that could not be placed on the screen at all.
     pub fn drop_face(&mut self) {
         self.stats.dropped += 1;
     }
 
-    /// Draws what is left and says what the picture took.
+    /// Draws the remaining jobs and returns the frame's counts.
     pub fn finish(mut self) -> Stats {
         self.draw();
         self.stats

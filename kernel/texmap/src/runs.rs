@@ -1,43 +1,48 @@
-//! Perspective by runs: quotients at the ends of short pieces of a run, and a polynomial between.
+//! Perspective by pieces of a span: quotients at the ends of short pieces, and a polynomial
+//! between.
 //!
-//! A run of `len` pixels has `len - 1` steps from its first pixel's centre to its last one's. They
-//! are cut into pieces; neighbours share the quotient between them, and the last piece ends *on* the
-//! run's last pixel: a run of one pixel has no piece to divide by.
+//! A span of `len` pixels has `len - 1` steps from its first pixel's centre to its last. The steps
+//! are cut into pieces. Neighbouring pieces share the quotient between them, and the last piece
+//! ends *on* the span's last pixel. So a span of one pixel has no piece, and nothing is divided by
+//! zero.
 //!
 //! # A quotient
 //!
-//! [`Reciprocal`] takes one division for the two coordinates of a place: off by less than
-//! 2^-16 (1 + 3/128) texel, and never above. A quotient outside the texture is clamped into it; on
-//! the horizon and beyond, where c is not above zero, it is not divided at all, and is what
-//! [`plane::coordinate`] makes of it.
+//! [`Reciprocal`] needs one division for the two coordinates of a place. A coordinate is off by
+//! less than 2^-16 (1 + 3/128) texel, and never above the quotient. A quotient outside the texture
+//! is clamped into it. On and beyond the horizon, where c is not above zero, no division happens,
+//! and the coordinate is that of [`plane::coordinate`].
 //!
 //! # Linear
 //!
-//! The step is cut towards zero, so between two ends inside the texture nothing is outside of it, and
-//! no loop clamps. After n pixels that is off by less than n 2^-16 texel.
+//! The step is cut towards zero. So nothing between two ends inside the texture lies outside it,
+//! and no loop clamps. After n pixels the cut step is off by less than n 2^-16 texel.
 //!
 //! # Quadratic
 //!
-//! Through both ends and the quotient at the middle, which may lie between two pixels: there the
-//! forms are half the sum of those at the ends. With d the difference of the ends, K = 2 (u0 + u1 - 2
-//! um) and y from 0 to 1 it is
+//! A quadratic piece passes through the quotients at both ends and at the middle. The middle may
+//! lie between two pixels: the forms there are half the sum of those at the ends. Let u0, um and u1
+//! be the coordinates at the start, the middle and the end, d = u1 - u0, K = 2 (u0 + u1 - 2 um),
+//! and y from 0 to 1 the position within the piece. The coordinate is
 //!
 //! ```text
 //! u0 + (d - K) y + K y^2
 //! ```
 //!
-//! Over n steps of a pixel the value grows by S, and S by T, with T = 2 K / n^2 and S = (d - K) / n +
-//! K / n^2: not by the two coefficients, which are those of a step without an end. They have 48
-//! fraction bits, and each is off by less than 2^13 / n last places (`share`), or by none where n is
-//! a power of two: over 319 pixels the value drifts by less than 2^-26 texel. It starts half of
-//! 2^-16 higher, so cutting the rest off rounds to nearest, and a drift below zero or beyond the last
-//! coordinate is cut off with it.
+//! Over n steps of one pixel, the value grows by S at the first step, and S grows by T at each
+//! step, with T = 2 K / n^2 and S = (d - K) / n + K / n^2. (S and T are differences, so they are
+//! not the polynomial's two coefficients, which belong to infinitely small steps.) They have 48
+//! fraction bits. S is off by less than 2^10 units in the last place and T by less than 2^11 / n
+//! (see `share`, with |d - K| <= 2 |d| <= 2^25), and both are exact where n is a power of two. So
+//! over 319 pixels the value drifts by less than 2^-26 texel. It starts half of 2^-16 higher, so
+//! that cutting off the remaining bits rounds to nearest, and a drift below zero or beyond the last
+//! coordinate is cut off with them.
 //!
-//! A quadratic may leave what its ends span. It does not where it turns nowhere between them, which is
-//! where |K| <= |d|: its slope is (d - K) at one end and (d + K) at the other. A piece that turns is
-//! drawn as two straight halves through the same three points, and those stay between them. Without
-//! clamped ends |K| / |d| is 2 (r - 1) / (r + 1), so that happens when the depth ratio r of a piece is
-//! above 3.
+//! A quadratic may leave the interval between its ends. It stays inside if it does not turn between
+//! them, that is, where |K| <= |d|: its slope is d - K at one end and d + K at the other. A piece
+//! that turns is drawn as two straight halves through the same three points, and these stay inside.
+//! Without clamped ends |K| / |d| is 2 (r - 1) / (r + 1), where r is the piece's depth ratio, so a
+//! piece turns when r is above 3.
 //!
 //! [`plane::coordinate`]: crate::plane::coordinate
 
@@ -49,25 +54,25 @@ use crate::loops::Draw;
 use crate::plane::Walk;
 use crate::{Texture, affine};
 
-/// Longest run in steps, which is one less than its pixels: a row of the screen.
+/// Longest span in steps, which is one less than its pixels: a row of the screen.
 const MAX_STEPS: usize = modex::WIDTH - 1;
 /// Longest piece of [`Pieces::Powers`].
 const LONGEST_POWER: u16 = 64;
 
-/// How a run is cut into pieces.
+/// A way to cut a span into pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pieces {
-    /// Of so many steps each, 2 to 128, and what is left over.
+    /// Pieces of the given number of steps, 2 to 128, and a last piece of the steps left over.
     Of(u8),
-    /// Of the powers of two that the run's steps are the sum of, none above 64, the longest first:
-    /// every division by a length is a shift.
+    /// Powers of two that add up to the span's steps, at most 64 each, the longest first. Every
+    /// division by a piece's length is a shift.
     Powers,
-    /// One: the run.
+    /// A single piece: the whole span.
     Whole,
 }
 
 impl Pieces {
-    /// The next piece's steps where `left` are left.
+    /// Returns the steps of the next piece when `left` steps are left.
     #[inline]
     fn next(self, left: u16) -> u16 {
         match self {
@@ -80,7 +85,7 @@ impl Pieces {
         }
     }
 
-    /// The longest piece of a run of so many steps.
+    /// Returns the steps of the longest piece in a span of `steps` steps.
     pub fn longest(self, steps: u16) -> u16 {
         self.next(steps)
     }
@@ -89,14 +94,15 @@ impl Pieces {
 /// 1 / c for c above zero, to 31 bits.
 #[derive(Clone, Copy, Debug)]
 pub struct Reciprocal {
-    /// Bits that c is short of 64.
+    /// Leading zeros of c: 64 less its bits.
     shift: u32,
-    /// 2^63 over c's highest 32 bits and one in their last place, rounded down: 2^31 to 2^32 - 1.
+    /// 2^63 / (h + 1), rounded down, where h is the highest 32 bits of c: 2^31 to 2^32 - 1.
     value: u64,
 }
 
 impl Reciprocal {
-    /// That of `c`, 1 to 2^55: a form of a [`crate::Plane`] on the screen, or the sum of two.
+    /// Returns the reciprocal of `c`, 1 to 2^55: a value of a form of a [`crate::Plane`] on the
+    /// screen, or the sum of two.
     #[inline]
     pub fn new(c: i64) -> Self {
         let shift = c.leading_zeros();
@@ -107,25 +113,27 @@ impl Reciprocal {
         }
     }
 
-    /// The bits that c is short of 64, and 2^63 over its highest 32 bits as [`Reciprocal::new`] has it.
+    /// Returns the leading zeros of c, and 2^63 / (h + 1) as in [`Reciprocal::new`].
     #[inline]
     pub(crate) fn parts(self) -> (u32, u64) {
         (self.shift, self.value)
     }
 
-    /// `rise` / c with 16 more fraction bits than `rise` has, for c of 16 bits or more. Off by 2^-31 of
-    /// itself, and rounded down.
+    /// Returns `rise` / c with 16 more fraction bits than `rise` has, for c of 16 bits or more. The
+    /// result is off by 2^-31 of its value, and is rounded down.
     #[inline]
     pub(crate) fn slope(self, rise: i64) -> i64 {
         ((i128::from(rise) * i128::from(self.value)) >> ((79 - self.shift) % 64)) as i64
     }
 
-    /// n / c in 16.16 for 0 <= n < 256 c: at most the quotient, and less by below 1 + 3/128 units.
+    /// Returns n / c in 16.16 for 0 <= n < 256 c: at most the quotient, and less than 1 + 3/128
+    /// units below it.
     ///
-    /// With c' = c 2^shift / 2^32 and n' = n 2^shift / 2^40 the quotient is 2^24 n' / c', and n' <
-    /// c'. Three things are rounded down, each worth less than 2^-7 units: n' to a whole number
-    /// (value / 2^39), 1 / c' to 1 / (c' + 1) at most (2^24 / c'), and the reciprocal to a whole
-    /// number (n' / 2^39). What is then cut off is less than a unit.
+    /// With c' = c 2^shift / 2^32 and n' = n 2^shift / 2^40, the quotient is 2^24 n' / c', and n' <
+    /// c'. Three values are rounded down, and each rounding costs less than 2^-7 units: n' to a
+    /// whole number (value / 2^39), 1 / c' to at least 1 / (c' + 1) (2^24 / c'), and the reciprocal
+    /// to a whole number (n' / 2^39). Cutting off the fraction of the result then costs less than
+    /// one unit.
     #[inline]
     pub fn times(self, n: i64) -> i32 {
         let high = (n as u64) << (self.shift - 8) >> 32;
@@ -133,11 +141,11 @@ impl Reciprocal {
     }
 }
 
-/// [`Reciprocal`] where c is from [`LargeReciprocal::LEAST`] on, bit for bit: one shift does for its
-/// two.
+/// A [`Reciprocal`] of a c from [`LargeReciprocal::LEAST`] on, with the same results bit for bit.
+/// It needs one shift where [`Reciprocal`] needs two.
 #[derive(Clone, Copy)]
 struct LargeReciprocal {
-    /// Bits that c has above 23.
+    /// Number of bits of c above 24.
     down: u32,
     value: u64,
 }
@@ -147,9 +155,9 @@ impl LargeReciprocal {
 
     #[inline]
     fn new(c: i64) -> Self {
-        // The number of c's highest bit, as the CPU tells it.
+        // The number of the highest bit of c, in the form that the CPU returns.
         let highest = 63 ^ (c as u64 | 1).leading_zeros();
-        // 32 bits, as the compiler has to know: one more of them is not zero.
+        // 32 bits, so that the compiler can see that `high` + 1 is not zero.
         let high = (c as u64 >> (highest - 31)) as u32;
         Self {
             down: highest - 23,
@@ -163,16 +171,16 @@ impl LargeReciprocal {
     }
 }
 
-/// The coordinates where the three forms have these values, clamped into a texture whose last
-/// coordinates are `last`.
+/// Returns the coordinates where the three forms have the values `forms`, clamped into a texture
+/// whose last coordinates are `last`.
 ///
-/// Off by less than 1 + 3/128 units of 2^-16 texel, and never above.
+/// They are off by less than 1 + 3/128 units of 2^-16 texel, and never above the quotients.
 #[inline]
 pub fn quotients(forms: [i64; 3], last: (i32, i32)) -> (i32, i32) {
     quotients_by(Reciprocal::new(forms[2].max(1)), forms, last)
 }
 
-/// [`quotients`] by the reciprocal of c, or of 1 where c is less.
+/// Returns [`quotients`], from the reciprocal of c, or of 1 where c is below 1.
 #[inline]
 pub(crate) fn quotients_by(
     reciprocal: Reciprocal,
@@ -202,10 +210,11 @@ const INVERSES: [u64; MAX_STEPS + 1] = {
     inverses
 };
 
-/// `delta / steps`, cut towards zero; |delta| < 2^24, steps 1 to 319.
+/// Returns `delta / steps`, cut towards zero; |delta| < 2^24, steps 1 to 319.
 ///
-/// Below 2^8 steps: (delta m) / 2^32 with m the next whole number above 2^32 / steps is too large by
-/// delta / 2^32 < 2^-8 at most, and a quotient is at least 1 / steps short of the next whole number.
+/// Below 2^8 steps the result is floor(delta m / 2^32), where m is the next whole number above 2^32
+/// / steps. Its error is at most delta / 2^32 < 2^-8 upward, and a quotient is at least 1 / steps
+/// below the next whole number.
 #[inline]
 pub fn over(delta: i32, steps: u16) -> i32 {
     if steps.is_power_of_two() {
@@ -224,11 +233,11 @@ pub fn over(delta: i32, steps: u16) -> i32 {
     }
 }
 
-/// `delta 2^32 / steps` and that over `steps` again; |delta| < 2^27.
+/// Returns `delta 2^32 / steps`, and that divided by `steps` again; |delta| < 2^27.
 ///
-/// The inverse is less than one short of 2^48 / steps. So the first is off by less than 2^27 / 2^16 + 1
-/// < 2^12, and the second by less than 2^59 / 2^48 + 2^12 / steps + 1 < 2^13 at most; both are exact
-/// where `steps` is a power of two up to 2^16.
+/// The inverse in the table is less than one below 2^48 / steps. So the first result is off by less
+/// than 2^27 / 2^16 + 1 < 2^12, and the second by less than 2^59 / 2^48 + 2^12 / steps + 1, which
+/// is below 2^13. Both are exact where `steps` is a power of two up to 2^16.
 #[inline]
 fn share(delta: i64, steps: u16) -> (i64, i64) {
     if steps.is_power_of_two() {
@@ -250,7 +259,7 @@ struct Path {
 }
 
 impl Path {
-    /// From `u`, 16.16, in steps of as much.
+    /// Returns the path from `u` in constant steps of `step`, both 16.16.
     fn straight(u: i32, step: i32) -> Self {
         Self {
             at: i64::from(u) << 32,
@@ -259,13 +268,13 @@ impl Path {
         }
     }
 
-    /// The polynomial multiplied out for pixel `i`.
+    /// Returns the coordinate at pixel `i`, with the polynomial evaluated from scratch, 16.16.
     fn after(&self, i: u16) -> i32 {
         let (i, pairs) = (i64::from(i), i64::from(i) * (i64::from(i) - 1) / 2);
         ((self.at + i * self.step + pairs * self.bend) >> 32) as i32
     }
 
-    /// The coordinate here; then it is a pixel further.
+    /// Returns the coordinate at the current pixel, and steps to the next pixel.
     #[inline(always)]
     fn next(&mut self) -> i64 {
         let here = self.at;
@@ -274,7 +283,7 @@ impl Path {
         here
     }
 
-    /// The path from pixel `i` on.
+    /// Returns the path that starts at pixel `i` of this path.
     fn from(&self, i: u16) -> Self {
         let pixels = i64::from(i);
         Self {
@@ -285,8 +294,8 @@ impl Path {
     }
 }
 
-/// A coordinate over a quadratic piece: the path of its first half, and of its second, which goes
-/// on from it unless the piece is two straight halves; and whether it is.
+/// Returns a coordinate over a quadratic piece: the path of its first half and of its second half,
+/// and whether the piece is two straight halves. If it is not, the second path continues the first.
 fn arc([from, middle, to]: [i32; 3], steps: u16) -> ([Path; 2], bool) {
     let [from, middle, to] = [from, middle, to].map(i64::from);
     let rounded = |u: i64| (u << 32) + (1 << 31);
@@ -303,40 +312,40 @@ fn arc([from, middle, to]: [i32; 3], steps: u16) -> ([Path; 2], bool) {
         return ([path, path.from(second)], false);
     }
     let [first, last] = [middle - from, to - middle].map(|half| share(2 * half, steps).0);
-    // An odd number of steps has its middle half a step before a pixel.
+    // The middle of an odd number of steps lies half a step before a pixel.
     let past = if steps % 2 == 1 { last / 2 } else { 0 };
     let halves = [(rounded(from), first), (rounded(middle) + past, last)];
     (halves.map(|(at, step)| Path { at, step, bend: 0 }), true)
 }
 
-/// A piece of a run: its pixels, and both coordinates' paths.
+/// A quadratic piece of a span: its pixels, and the paths of both coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 struct Quadratic {
     pixels: u16,
-    /// Where the second paths begin: `pixels` where they only go on from the first.
+    /// The pixel where the second paths begin: `pixels` if they only continue the first paths.
     second: u16,
     paths: [[Path; 2]; 2],
 }
 
-/// What cuts a run into pieces.
+/// Cuts a span into pieces.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cuts {
     walk: Walk,
     pieces: Pieces,
     last: (i32, i32),
-    /// Where the next piece begins.
+    /// The coordinates where the next piece begins.
     here: (i32, i32),
-    /// Steps left.
+    /// The steps left.
     left: u16,
 }
 
-/// A piece: its steps, its pixels, and where it goes from and to.
+/// A piece of a span: its steps, its pixels, and the coordinates at its ends.
 pub(crate) struct Piece {
     steps: u16,
     pixels: u16,
     from: (i32, i32),
     to: (i32, i32),
-    /// The forms in the middle, twice.
+    /// Twice the forms at the middle.
     middle: [i64; 3],
 }
 
@@ -346,7 +355,7 @@ impl Piece {
         self.pixels
     }
 
-    /// The walk along it.
+    /// Returns the affine walk along the piece.
     #[inline]
     pub(crate) fn straight(&self) -> affine::Walk {
         between(self.from, self.to, self.steps)
@@ -366,7 +375,7 @@ impl Cuts {
         }
     }
 
-    /// The next piece; whoever has drawn the run's pixels asks for no more.
+    /// Returns the next piece. Call it only until the pieces have all of the span's pixels.
     #[inline]
     pub(crate) fn next(&mut self) -> Piece {
         let steps = self.pieces.next(self.left);
@@ -413,8 +422,8 @@ impl Cuts {
     }
 }
 
-/// Draws a column, linear in each piece. `draw` draws each; where one comes as often as to be worth
-/// it, and has its pixels in whole eights, `draw_eights` does.
+/// Draws a column that is linear in each piece. `draw` draws a piece. `draw_eights` draws pieces
+/// whose pixels come in whole eights, where there are enough pieces to make it worthwhile.
 #[inline(always)]
 pub(crate) fn linear(
     texture: &Texture<'_>,
@@ -425,7 +434,8 @@ pub(crate) fn linear(
     mut column: Column<'_>,
 ) {
     let (last, mut left) = (texture.last(), column.len() - 1);
-    // Both ends of the run are in the texture, before the eye: so is all between them.
+    // If both ends of the span are inside the texture and in front of the eye, everything between
+    // them is too.
     let [width, height] = [last.0, last.1].map(|last| i64::from(last >> 16) + 1);
     let needs_no_clamp = |[a, b, c]: [i64; 3]| a >= 0 && b >= 0 && a < width * c && b < height * c;
     if !(needs_no_clamp(walk.at) && needs_no_clamp(walk.after(left))) {
@@ -442,12 +452,13 @@ pub(crate) fn linear(
         Pieces::Powers => LONGEST_POWER,
         Pieces::Whole => 0,
     };
-    // Pieces of as many steps, a power of two, but for the last one, which has another pixel.
+    // Pieces of equally many steps, a power of two. The last piece has one pixel more, so it is not
+    // among them.
     if left > alike
         && alike >= 8
         && alike.is_power_of_two()
         && at[2].min(walk.after(left + alike)[2]) >= LargeReciprocal::LEAST
-        // No loop needs to ask again.
+        // Checked once here, so that no loop has to.
         && texture.masks().is_some()
     {
         let bits = alike.trailing_zeros();
@@ -459,14 +470,15 @@ pub(crate) fn linear(
             (delta + up) >> bits
         };
         let [mut a, mut b, mut c] = [at[0], at[1], at[2] + stride[2]];
-        // Not known to be a division: the compiler would move all of them to where they are used.
+        // Hide the division from the compiler, which would otherwise move each division to the
+        // place of its use.
         let mut over = black_box(LargeReciprocal::new(c));
         for pixels in pixels.chunks(alike) {
             a += stride[0];
             b += stride[1];
             c += stride[2];
             let ((u, v), to) = (here, (over.times(a), over.times(b)));
-            // The next piece's division takes its time while this one is drawn.
+            // The division for the next piece runs while this piece is drawn.
             over = LargeReciprocal::new(c);
             let (du, dv) = (cut(to.0 - u), cut(to.1 - v));
             draw_eights(texture, affine::Walk { u, v, du, dv }, pixels);
@@ -487,7 +499,7 @@ pub(crate) fn linear(
     }
 }
 
-/// The same where quotients may have to be clamped into the texture.
+/// Draws a column as [`linear`] does, where quotients may have to be clamped into the texture.
 #[cold]
 fn linear_clamped(
     texture: &Texture<'_>,
@@ -505,7 +517,7 @@ fn linear_clamped(
     }
 }
 
-/// The walk of `steps` steps between two places inside the texture.
+/// Returns the walk of `steps` steps between two places inside the texture.
 #[inline]
 pub fn between(from: (i32, i32), to: (i32, i32), steps: u16) -> affine::Walk {
     let (du, dv) = match steps {
@@ -546,23 +558,24 @@ pub fn quadratic(
 }
 
 /// The coordinates of a plane's walk, linear or quadratic in each piece, pixel after pixel: the
-/// clear twin of `linear` and [`quadratic`], each polynomial multiplied out for every pixel.
+/// reference implementation of `linear` and [`quadratic`], which evaluates each polynomial from
+/// scratch for every pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct Steps {
     cuts: Cuts,
     is_linear: bool,
     piece: Quadratic,
-    /// Pixels of the piece that were given.
+    /// Pixels of the piece that were returned.
     given: u16,
 }
 
 impl Steps {
-    /// Linear in each piece.
+    /// Returns the coordinates of pieces that are linear.
     pub fn linear(walk: Walk, len: u16, pieces: Pieces, texture: &Texture<'_>) -> Self {
         Self::new(walk, len, pieces, texture, true)
     }
 
-    /// Quadratic in each piece.
+    /// Returns the coordinates of pieces that are quadratic.
     pub fn quadratic(walk: Walk, len: u16, pieces: Pieces, texture: &Texture<'_>) -> Self {
         Self::new(walk, len, pieces, texture, false)
     }
@@ -594,7 +607,7 @@ impl Steps {
     }
 }
 
-/// Past the run's last pixel it stays where that is.
+/// Yields the coordinates. Past the span's last pixel they stay at that pixel's.
 impl Iterator for Steps {
     type Item = (i32, i32);
 

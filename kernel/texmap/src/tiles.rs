@@ -1,26 +1,28 @@
-//! Tiles: the polygon cut by a grid of the screen, and affine inside each tile.
+//! The tile mapper: the screen's grid cuts the polygon, and the mapping is affine inside each tile.
 //!
-//! The period cut polygons into smaller ones and drew those affine. New vertices would have to be
-//! snapped, and the picture's outline and seams with them; here the screen's own grid cuts, every
-//! [`SIDE`] pixels, so coverage stays what it is. The quotient is taken at the tiles' corners, which
-//! are centres of pixels and which neighbours share. A column's run is cut where it passes from a
-//! tile into the next; its coordinates at the tile's top and bottom are interpolated between the
-//! corners, and those of its pixels between these two. Every division by a length is a shift.
+//! Renderers of the time cut polygons into smaller ones and drew those affine. But new vertices
+//! would have to be snapped, and would move the frame's outline and seams. Here the screen's own
+//! grid cuts, every [`SIDE`] pixels, so coverage does not change. The quotient is computed at the
+//! corners of the tiles, which are centres of pixels and are shared by neighbouring tiles. A
+//! column's span is cut where it passes from one tile into the next. Its coordinates at the tile's
+//! top and bottom are interpolated between the corners, and the coordinates of its pixels between
+//! top and bottom. Every division by a length is a shift.
 //!
-//! Corners outside the polygon lie in its plane and may lie outside the texture. They are not
-//! clamped, since that would bend the tile; the walks are, where they step over the border.
+//! Corners outside the polygon still lie in its plane, and may lie outside the texture. They are
+//! not clamped, since that would bend the tile. The walks are clamped where they cross the border.
 //!
 //! # Error
 //!
-//! Between two places with the depth ratio r (at least 1), between which u changes by du, linear
-//! interpolation is off by at most |du| (sqrt r - 1)/(sqrt r + 1). Along the top and the bottom of
-//! the tile that is the error at the column's two ends, and no more of it than its share arrives at
-//! a pixel between them. Down the column it comes in once more, for the exact coordinates at these
-//! ends. So the bound is the larger one of top and bottom, plus the column's: closed, and reached
-//! where the two have one sign. To that comes [`DRIFT`].
+//! Let u change by du between two places with the depth ratio r (at least 1). Linear interpolation
+//! between them is off by at most |du| (sqrt r - 1)/(sqrt r + 1). Along the top and the bottom of
+//! the tile, that bounds the error at the column's two ends, and a pixel between the ends gets a
+//! weighted mean of the two errors. Down the column the same formula applies once more, to the
+//! interpolation between the exact coordinates at these ends. So the bound is the larger of the
+//! errors of top and bottom, plus the column's own: a closed form, which is reached where the two
+//! have the same sign. Fixed point adds up to [`DRIFT`].
 //!
-//! A tile that has a corner on or beyond the horizon, further than 4096 texels away, or
-//! [`MOST_DEPTH`] times as deep as another, has no use for its corners: its runs are exact.
+//! If a tile has a corner on or beyond the horizon, or a corner further than 4096 texels away, or a
+//! corner [`MOST_DEPTH`] times as deep as another, its corners are not used: its spans are exact.
 
 use modex::{HEIGHT, WIDTH};
 
@@ -31,14 +33,15 @@ use crate::plane::{self, Plane};
 use crate::straight::{REACH, Straight};
 use crate::{Face, Texture};
 
-/// Pixels along a tile's side.
+/// Length of a tile's side in pixels.
 pub const SIDE: u16 = 1 << BITS;
 const BITS: u32 = 4;
-/// Depth of a tile's deepest corner over that of its nearest, at most: from there on linear
-/// interpolation is off by more than a third of the way between them.
+/// Limit of the ratio between the depths of a tile's deepest and nearest corners. From this ratio
+/// on, linear interpolation is off by a third or more of the difference between them.
 pub const MOST_DEPTH: i64 = 4;
 /// Most that fixed point adds to the error, 16.16: the corner and the walk's start are rounded
-/// down, 15 steps to nearest, and the reciprocal is off by an eighth at the furthest corner.
+/// down, 15 steps are rounded to nearest, and the reciprocal is off by 1/8 of a unit at the
+/// furthest corner.
 pub const DRIFT: i32 = 10;
 
 /// Corners down the screen.
@@ -48,13 +51,13 @@ const _: () = assert!(WIDTH.is_multiple_of(SIDE as usize) && HEIGHT.is_multiple_
 /// u and v, 16.16 and within `REACH`, and c, above zero.
 type Corner = [i64; 3];
 
-/// The corners left and right of a column of tiles, found when they are first asked for.
+/// The corners on the left and on the right of a column of tiles, computed on first use.
 #[derive(Debug)]
 struct Grid {
     plane: Plane,
-    /// The column of tiles.
+    /// Index of the column of tiles.
     column: u16,
-    /// Whether a corner was asked for, and what it is if it is of use.
+    /// The corners: outer `None` if not yet computed, inner `None` if the corner is unusable.
     sides: [[Option<Option<Corner>>; CORNERS]; 2],
 }
 
@@ -67,7 +70,8 @@ impl Grid {
         }
     }
 
-    /// Goes to another column of tiles; what was on the right of this one may be on its left.
+    /// Moves to another column of tiles. If it is the next column, the right corners become its
+    /// left corners.
     fn go(&mut self, column: u16) {
         let [_, right] = self.sides;
         self.sides = match column == self.column + 1 {
@@ -91,7 +95,7 @@ impl Grid {
         })
     }
 
-    /// The walk of column `x`, down from line `y`, in the tile that holds the pixel.
+    /// Returns the walk of column `x`, down from line `y`, in the tile that holds the pixel.
     fn walk(&mut self, x: u16, y: u16) -> Option<Straight> {
         let row = y / SIDE;
         let corners = [
@@ -109,7 +113,7 @@ impl Grid {
         let [i, j] = [x, y].map(|k| i64::from(k % SIDE));
         let [(u, du), (v, dv)] = [0, 1].map(|k| {
             let [a, b, c, d] = corners.map(|corner| corner[k]);
-            // Multiplied out nothing is lost: 20 fraction bits at the ends, then 24.
+            // Multiplied out, nothing is lost: 20 fraction bits at the ends, then 24.
             let top = (a << BITS) + (b - a) * i;
             let bottom = (c << BITS) + (d - c) * i;
             let step = bottom - top;
@@ -124,10 +128,10 @@ impl Grid {
     }
 }
 
-/// Gives `sink` the jobs of a face.
+/// Passes the jobs of a face to `sink`.
 ///
 /// # Errors
-/// A polygon outside the legal range; nothing of it was given to `sink`.
+/// If the polygon is outside the legal range; then `sink` has received no job.
 pub(crate) fn jobs(
     face: &Face<'_>,
     texture: &Texture<'_>,

@@ -1,39 +1,40 @@
-//! Hidden surfaces: which face is seen at each pixel, as visible spans, column by column.
+//! Hidden surfaces: the visible face at each pixel, as visible spans, column by column.
 //!
-//! Of a convex solid the faces that look at the viewer hide nothing of each other, and nothing here
-//! is needed. Of any other the faces are asked twice. First each of them gives the pixels that it
-//! covers to the columns' spans, where it keeps those at which it is nearer than what was there.
-//! Then the mappers make their jobs, of the faces that are seen at all, and each job is cut to its
-//! face's spans. So every pixel is written once, by the nearest face; no polygon is split, which
-//! would make T-junctions, and no mapper knows of it.
+//! The faces of a convex solid that look at the viewer hide no part of each other, so such a solid
+//! needs nothing from this module. For any other solid, the faces are visited twice. First each
+//! face is laid over the columns: it keeps the pixels of its coverage where it is nearer than the
+//! face that was there. Then the mappers make the jobs of the visible faces, and each job is cut to
+//! its face's spans. So every pixel is written once, by the nearest face. No polygon is split,
+//! which would make T-junctions, and no mapper knows about it.
 //!
 //! # Depth
 //!
-//! The ray t d through a pixel meets the plane n . p = s, s = n . V for a point V of it, at
-//! 1 / t = (n . d) / s. Here n is the cross product of the face's three anchors, d a linear form of
-//! the screen as in [`crate::plane`], and s above zero for a face that looks at the viewer. Which of
-//! two faces is nearer is decided by (n . d) s' > (n' . d) s, exactly; of faces that are equally near
-//! the one that came first stays. Nothing is rounded but the normal of a face that spans some 80
-//! units or more: it is cut to 45 bits, once, and s is taken from the cut one.
+//! The ray t d through a pixel meets the plane n . p = s, where s = n . V for a point V of the
+//! plane, at 1 / t = (n . d) / s. Here n is the cross product of two edges between the face's three
+//! anchors, and n . d is a linear form of the screen as in [`crate::plane`]. s is above zero for a
+//! face that looks at the viewer. A face with n and s is nearer than a face with n' and s' when
+//! (n . d) s' > (n' . d) s, which is decided exactly. Of equally near faces, the first stays. Only
+//! the normal of a face that spans some 80 units or more is rounded: it is reduced to 45 bits,
+//! once, and s is computed from the reduced normal.
 //!
-//! A face that is seen exactly edge-on, or turned over by the rounding to the screen's grid (s <= 0),
-//! counts as infinitely far away: it shows where nothing else is.
+//! A face that is seen exactly edge-on, or that rounding to the screen's grid has turned over
+//! (s <= 0), counts as infinitely far away: it shows only where no other face is.
 //!
-//! # Why halving finds where one face comes to lie before another
+//! # Why bisection finds the change between two faces
 //!
-//! Down a column both sides of the comparison are linear, so it changes at most once: equal ends
-//! mean that all between are the same.
+//! Down a column both sides of the comparison are linear, so its result changes at most once. If
+//! the result is equal at two pixels, it is equal at all pixels between.
 //!
 //! # Ranges
 //!
-//! Anchors are within [`MAX_POSITION`](crate::plane::MAX_POSITION), 2^24, and the focal length is at
-//! most 2^9 pixels here. With n cut to 45 bits n . d is below 2^45 (320 + 240 + 2^10) < 2^56 and s
-//! below 3 2^45 2^24 < 2^71, and a product of the two fits 127 bits.
+//! Anchors are within [`MAX_POSITION`](crate::plane::MAX_POSITION), 2^24, and the focal length is
+//! at most 2^9 pixels here. With n reduced to 45 bits, n . d is below 2^45 (320 + 240 + 2^10) <
+//! 2^56 and s is below 3 2^45 2^24 < 2^71, so a product of the two fits 127 bits.
 //!
-//! # Room
+//! # Capacity
 //!
-//! Spans of a column are disjoint and none is empty, so there are at most as many as pixels: the
-//! arena can't be full.
+//! The spans of a column are disjoint and not empty, so a column has at most as many spans as
+//! pixels: the arena cannot overflow.
 
 use crate::coverage::{Axis, Dropped, Run, spans};
 use crate::job::Job;
@@ -46,17 +47,18 @@ const NORMAL_BITS: u32 = 45;
 /// Largest focal length for which the comparison's products fit.
 const MAX_FOCAL_LENGTH: i32 = 1 << 9;
 
-/// How near the plane of a face is, at every pixel.
+/// The inverse depth of a face's plane, at every pixel.
 #[derive(Clone, Copy, Debug)]
 struct Nearness {
-    /// Over `span`: what 1 / z is, but for a factor that all faces share.
+    /// Numerator n . d: `form` / `over` is 1 / z up to a factor that all faces share.
     form: Form,
-    /// Above zero.
+    /// Denominator s; above zero.
     over: i128,
 }
 
 impl Nearness {
-    /// Infinitely far away; all zeros, but for what it is divided by.
+    /// Infinitely far away, except that `over` is zero and has to be set. All zeros, so that a
+    /// static of them takes no space in an image.
     const NONE: Self = Self {
         form: Form {
             origin: 0,
@@ -69,7 +71,7 @@ impl Nearness {
     fn new(face: &Face<'_>) -> Self {
         debug_assert!((1..=MAX_FOCAL_LENGTH).contains(&face.focal_length));
         let [v0, v1, v2] = face.anchors.map(|anchor| anchor.position.map(i64::from));
-        // Differences are below 2^25, their products below 2^50.
+        // Differences are below 2^25, and their products below 2^50.
         let [a, b] = [v1, v2].map(|v| [0, 1, 2].map(|k| v[k] - v0[k]));
         let normal = [
             a[1] * b[2] - a[2] * b[1],
@@ -95,14 +97,14 @@ impl Nearness {
         Self { form, over }
     }
 
-    /// Whether it is nearer than `other` at pixel (x, y).
+    /// Returns whether this face is nearer than `other` at pixel (x, y).
     fn beats(&self, other: &Self, x: u16, y: u16) -> bool {
         let at = |nearness: &Self| i128::from(nearness.form.at(x, y));
         at(self) * other.over > at(other) * self.over
     }
 }
 
-/// Pixels `top..end` of a column, at which `face` is seen.
+/// A visible span: pixels `top..end` of a column, where `face` is visible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Span {
     top: u8,
@@ -112,7 +114,7 @@ struct Span {
 
 const _: () = assert!(HEIGHT <= u8::MAX as usize);
 
-/// The spans of one column, downward; neighbours of one face are one span.
+/// The visible spans of one column, downward. Adjacent spans of one face are merged.
 #[derive(Clone, Copy, Debug)]
 struct Spans {
     spans: [Span; HEIGHT],
@@ -149,19 +151,19 @@ impl Spans {
     }
 }
 
-/// The faces of one picture, at most `FACES`, and where each of them is seen.
+/// The faces of one frame, at most `FACES`, and the pixels where each of them is visible.
 #[derive(Clone, Copy, Debug)]
 pub struct Visible<const FACES: usize> {
     columns: [Spans; WIDTH],
-    /// Columns that are being changed are copied from here.
+    /// A copy of the column that is being changed.
     before: Spans,
     faces: [Nearness; FACES],
-    /// Of each face, whether it has a span.
+    /// Whether each face has a span.
     seen: [bool; FACES],
 }
 
 impl<const FACES: usize> Visible<FACES> {
-    /// Without any face. All of it is zeros: a static of it takes no room in an image.
+    /// Returns a value without faces. It is all zeros, so a static takes no space in an image.
     pub const fn new() -> Self {
         Self {
             columns: [Spans::EMPTY; WIDTH],
@@ -171,17 +173,18 @@ impl<const FACES: usize> Visible<FACES> {
         }
     }
 
-    /// Takes all faces away.
+    /// Removes all faces.
     pub fn clear(&mut self) {
         for column in &mut self.columns {
             column.len = 0;
         }
     }
 
-    /// Adds a face that looks at the viewer, by a number below `FACES` that no other has.
+    /// Adds a face that looks at the viewer. `number` must be below `FACES` and different for each
+    /// face.
     ///
     /// # Errors
-    /// A polygon outside the legal range; nothing of it was added.
+    /// If the polygon is outside the legal range; then no part of it was added.
     ///
     /// # Panics
     /// If the number is not below `FACES`.
@@ -190,7 +193,7 @@ impl<const FACES: usize> Visible<FACES> {
         spans(Axis::Down, face.polygon, |run| self.lay(number, &run))
     }
 
-    /// Lays a run of a face over its column.
+    /// Lays a span of a face over its column.
     fn lay(&mut self, number: u16, run: &Run<()>) {
         let Self {
             columns,
@@ -201,7 +204,7 @@ impl<const FACES: usize> Visible<FACES> {
         let x = run.line;
         let column = &mut columns[usize::from(x)];
         let (mut from, end) = (run.first, run.first + run.len);
-        // Nothing is there yet, or all of it above: nothing has to be made room for.
+        // The column is empty, or all its spans are above: append.
         if column
             .all()
             .last()
@@ -215,7 +218,7 @@ impl<const FACES: usize> Visible<FACES> {
         let own = &faces[usize::from(number)];
         for span in before.all() {
             let (top, bottom) = (u16::from(span.top), u16::from(span.end));
-            // What the run has above this span.
+            // The part of the new span above this span.
             column.push(number, from, end.min(top));
             from = from.max(end.min(top));
             let (first, last) = (top.max(from), bottom.min(end));
@@ -227,7 +230,7 @@ impl<const FACES: usize> Visible<FACES> {
             let beats = |y| own.beats(&faces[usize::from(span.face)], x, y);
             let (above, below) = (beats(first), beats(last - 1));
             let face = |won| if won { number } else { span.face };
-            // The first pixel of which the other is said.
+            // The first pixel where the comparison has the other result.
             let turn = match above == below {
                 true => last,
                 false => halve(first, last, |y| beats(y) == above),
@@ -240,7 +243,7 @@ impl<const FACES: usize> Visible<FACES> {
         column.push(number, from, end);
     }
 
-    /// Finds out which faces are seen, when all were added.
+    /// Determines which faces are visible. Call it after the last face was added.
     pub fn finish(&mut self) {
         self.seen = [false; FACES];
         for span in self.columns.iter().flat_map(Spans::all) {
@@ -248,12 +251,12 @@ impl<const FACES: usize> Visible<FACES> {
         }
     }
 
-    /// Whether a face is seen at any pixel; asked after [`Visible::finish`].
+    /// Returns whether a face is visible at any pixel. Call it after [`Visible::finish`].
     pub fn sees(&self, number: u16) -> bool {
         self.seen[usize::from(number)]
     }
 
-    /// The face that is seen at pixel (x, y), if there is one.
+    /// Returns the face that is visible at pixel (x, y), if any.
     pub fn at(&self, x: u16, y: u16) -> Option<u16> {
         let spans = self.columns[usize::from(x)].all();
         let after = spans.partition_point(|span| u16::from(span.end) <= y);
@@ -261,7 +264,7 @@ impl<const FACES: usize> Visible<FACES> {
         (u16::from(span.top) <= y).then_some(span.face)
     }
 
-    /// Gives `sink` the parts of a face's job at which the face is seen, in the job's order.
+    /// Passes the parts of a face's job where the face is visible to `sink`, in the job's order.
     pub fn cut(&self, number: u16, job: &Job, mut sink: impl FnMut(Job)) {
         if job.is_column() {
             let (top, end) = (job.y, job.y + job.len);
@@ -298,7 +301,8 @@ impl<const FACES: usize> Default for Visible<FACES> {
     }
 }
 
-/// The first of `first + 1..=last` for which `holds` no longer does, as it does for `first`.
+/// Returns the first number in `first + 1..=last` for which `holds` is false, given that it is true
+/// for `first`. `last` counts as false and is not tested.
 fn halve(first: u16, last: u16, holds: impl Fn(u16) -> bool) -> u16 {
     let (mut yes, mut no) = (first, last);
     while no - yes > 1 {

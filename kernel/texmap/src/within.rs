@@ -1,56 +1,62 @@
-//! The cheapest way that keeps to an error.
+//! The mapper that stays within an error: the cheapest way to map each span that keeps to a
+//! tolerance.
 //!
-//! For every polygon, and then for every run, a closed form says how far each way to map it may be
-//! from the quotients; of those that keep to the [`Tolerance`] the cheapest is taken. From the
-//! cheapest on:
+//! For every polygon, and then for every span, closed forms bound the error of each way to map it
+//! against the quotients. Of the ways that keep to the [`Tolerance`], the mapper uses the cheapest.
+//! From the cheapest on:
 //!
-//! | way | takes | for |
+//! | way | cost | applies to |
 //! | --- | --- | --- |
-//! | one affine map | nothing but its steps | a polygon |
-//! | a line | two quotients | a run; where all of a polygon's may be lines that is found out once |
-//! | shorter lines | a quotient each, see [`crate::adaptive`] | a run |
-//! | quotients | one for every pixel | what is left of a run |
+//! | an affine map | nothing but its steps | a polygon |
+//! | a line | two quotients | a span; one test shows where all spans of a polygon can be lines |
+//! | shorter lines | a quotient each, see [`crate::adaptive`] | a span |
+//! | quotients | one for every pixel | the rest of a span |
 //!
-//! The quotients are 0 off, so there always is a way.
+//! The quotients have error 0, so a way always exists.
 //!
-//! Quadratic pieces are none of the ways. One of 16 pixels takes longer than its quotients, and one
-//! of 32 three quarters of their time, where lines of eight take a third. So they could serve only
-//! where such lines err too much and such a curve does not, which is where depth changes by less
-//! than a third over it: of the pixels of random faces those are 1 % at most for errors down to
-//! 1/16, and 7 % for 1/256 (`tests/within.rs` prints and holds the shares).
+//! Quadratic pieces are not among the ways. A quadratic piece of 16 pixels costs more than 16
+//! quotients, and a piece of 32 pixels three quarters as much as 32 quotients, while lines of eight
+//! pixels cost a third. So a quadratic could help only where such lines err too much and such a
+//! curve does not, which is where the depth changes by less than a third over the curve. In random
+//! faces that is at most 1 % of the pixels for errors down to 1/16 texel, and 7 % for 1/256 texel
+//! (`tests/within.rs` prints the shares and checks them).
 //!
 //! # One affine map
 //!
-//! A small face, or one that hardly leans, needs no quotient for its runs at all. For any f0 and c0
-//! the linear function A = f0 + (n - f0 c) / c0 differs from f = n / c by
+//! A face that is small, or hardly tilted, needs no quotient for its spans at all. Let f = n / c be
+//! a texture coordinate, where n is the form a or b. For any f0 and c0, the linear function
+//! A = f0 + (n - f0 c) / c0 differs from f by
 //!
 //! ```text
 //! f - A = (A - f0) (c0 - c) / c
 //! ```
 //!
-//! exactly. Both factors are linear, so over a polygon neither is larger than at a corner, and c is
-//! nowhere less. With f0 and c0 in the middle of what the corners have, that is a quarter of what f
-//! and c change by, over the least c.
+//! exactly. Both factors of the numerator are linear, so over a polygon neither is larger in
+//! magnitude than at some corner, and c is nowhere less than at some corner. With f0 and c0 in the
+//! middle of the corners' values, the error is at most a quarter of the product of the changes of A
+//! and of c over the polygon, divided by the least c.
 //!
 //! # Lines
 //!
-//! All columns of a polygon have the same c', and D is linear across them: with the larger one of
-//! the first and the last column one R serves them all ([`crate::bounds`]), and of most columns two
-//! multiplications tell that they may be lines. Where it does not, or a column's end is clamped,
-//! the column's own R is asked for.
+//! All columns of a polygon have the same c', the change of c per pixel, and D is linear across the
+//! columns ([`crate::bounds`] defines D and R). So an R computed from the larger |D| of the first
+//! and the last column serves all columns, and for most columns two multiplications then show that
+//! the column can be a line. Where they do not show it, or an end of the column is clamped, the
+//! column's own R decides.
 //!
 //! # Columns or rows
 //!
-//! A floor's depth changes fast down its columns and hardly along its rows: lines are many times as
-//! long there. By the closed form a line that keeps to T is sqrt(4 T c^3 / |D c'|) pixels long, c'
-//! being what c changes by along it. So at some of the polygon's places it is asked how long lines
-//! would be either way, and what they would take; the axis that takes less, in sum, is the
-//! polygon's. Which pixels are covered does not depend on it ([`crate::coverage`]).
+//! The depth of a floor changes fast down its columns and hardly along its rows, so lines are many
+//! times longer along rows. By the closed form, a line that keeps to a tolerance T is
+//! sqrt(4 T c^3 / |D c'|) pixels long, where c' is the change of c along the line. So at some
+//! places of the polygon the mapper computes the length and the cost of lines in both directions.
+//! The axis with the smaller total cost becomes the polygon's axis. The covered pixels do not
+//! depend on the axis ([`crate::coverage`]).
 //!
-//! A pixel takes about the same either way. In the order of the polygons, and in RAM, a piece of a
-//! row is made once, but plane by plane four times: in between, it counts as [`ROW`] pieces of a
-//! column. So rows are taken where they gain a good deal, and in the order of the planes may still
-//! lose a little. A mapper knows no order, and no pixel depends on one.
+//! A pixel costs about the same in both directions. A piece of a row is made once in the order of
+//! the polygons and in RAM, but four times in the order of the planes. As a compromise it counts as
+//! [`ROW`] pieces of a column. So rows are used where they gain much, and may still lose a little
+//! in the order of the planes. A mapper does not know the order, and no pixel depends on the order.
 
 use core::fmt;
 
@@ -63,12 +69,13 @@ use crate::runs::Reciprocal;
 use crate::{Texture, Vertex, job};
 use modex::{HEIGHT, WIDTH};
 
-/// An error that can be accepted: 2^-16 to 256 texels, in 2^-16 texel.
+/// An acceptable error: 1 to 2^24 units of 2^-16 texel, which is 2^-16 to 256 texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Tolerance(u32);
 
 impl Tolerance {
-    /// The fraction of a texel, rounded down to 2^-16; none below that, or above 256 texels.
+    /// Returns the fraction of a texel, rounded down to 2^-16, or nothing if it is below 2^-16 or
+    /// above 256 texels.
     pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
         if denominator == 0 {
             return None;
@@ -79,31 +86,31 @@ impl Tolerance {
         }
     }
 
-    /// 2^-16 texel.
+    /// Returns the error in units of 2^-16 texel.
     pub const fn units(self) -> u32 {
         self.0
     }
 
-    /// A whole number or a fraction of two: `2`, `1/256`.
+    /// Parses a whole number, or a fraction of two whole numbers: `2`, `1/256`.
     pub fn parse(text: &str) -> Option<Self> {
         let (numerator, denominator) = text.split_once('/').unwrap_or((text, "1"));
         Self::new(numerator.parse().ok()?, denominator.parse().ok()?)
     }
 
-    /// A texel.
+    /// One texel.
     pub const TEXEL: Self = Self::part(0);
 
-    /// Half of it, if that is legal.
+    /// Returns half of this tolerance, or nothing if that is out of range.
     pub const fn half(self) -> Option<Self> {
         Self::new(self.0, 1 << 17)
     }
 
-    /// Twice as much, if that is legal.
+    /// Returns twice this tolerance, or nothing if that is out of range.
     pub const fn double(self) -> Option<Self> {
         Self::new(2 * self.0, 1 << 16)
     }
 
-    /// 1 / 2^`bits` texel; at most 16 bits.
+    /// Returns 1 / 2^`bits` texel, for at most 16 bits.
     pub(crate) const fn part(bits: u32) -> Self {
         Self(1 << (16 - bits))
     }
@@ -119,22 +126,22 @@ impl fmt::Display for Tolerance {
     }
 }
 
-/// As how many pieces of a column one of a row counts.
+/// The assumed cost of making a piece of a row, in pieces of a column.
 pub const ROW: u32 = 2;
 
-/// What a polygon spans.
+/// A polygon's bounding box on the screen, and the middle of its texture coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Span {
-    /// On the screen, in 1/256 pixel: left, top, right, bottom.
+    /// The part on the screen, in 1/256 pixel: left, top, right, bottom.
     borders: [i32; 4],
-    /// Whether it lies on the screen.
+    /// Whether the whole polygon lies on the screen.
     is_whole: bool,
-    /// The middle of its coordinates in the texture.
+    /// The middle of its texture coordinates, across and down.
     about: [i32; 2],
 }
 
 impl Span {
-    /// That of a polygon, if it spans any of the screen.
+    /// Returns the bounding box of a polygon, or nothing if it does not overlap the screen.
     fn new(polygon: &[Vertex]) -> Option<Self> {
         let (mut least, mut most) = ([i32::MAX; 4], [i32::MIN; 4]);
         for vertex in polygon {
@@ -156,8 +163,8 @@ impl Span {
         })
     }
 
-    /// Gives `sink` corners between which all of the polygon on the screen lies, from the centre of
-    /// pixel (0, 0), in 1/256 pixel: its own, or those of the borders.
+    /// Passes corners that enclose the polygon's part on the screen to `sink`, relative to the
+    /// centre of pixel (0, 0), in 1/256 pixel: the polygon's own corners, or those of the box.
     #[inline(always)]
     fn corners(&self, polygon: &[Vertex], mut sink: impl FnMut(i64, i64)) {
         let mut corner = |x: i32, y: i32| sink((x - 128).into(), (y - 128).into());
@@ -173,7 +180,7 @@ impl Span {
         }
     }
 
-    /// The first and the last pixel that may have their centre in it, either way.
+    /// Returns the first and the last pixel, as (x, y), that may have their centre in the box.
     fn pixels(&self) -> [(u16, u16); 2] {
         let [left, top, right, bottom] = self.borders;
         let first = |border: i32| (border >> 8) as u16;
@@ -181,13 +188,14 @@ impl Span {
         [(first(left), first(top)), (last(right), last(bottom))]
     }
 
-    /// No depth of the polygon on the screen is above the first of these, or below the second; both
-    /// are above zero, or there are none.
+    /// Returns the limits (near, far) of the polygon's depths on the screen: no depth is above near
+    /// or below far. Returns nothing unless both are above zero. A depth is a value of the form c,
+    /// which is large near the eye.
     #[inline]
     fn depths(&self, polygon: &[Vertex], c: &Form) -> Option<(i64, i64)> {
         let (mut near, mut far) = (i64::MIN, i64::MAX);
         self.corners(polygon, |x, y| {
-            // 8 more bits than at a pixel's centre.
+            // With 8 more bits than at a pixel's centre.
             let depth = c.origin * 256 + c.right * x + c.down * y;
             near = near.max(depth);
             far = far.min(depth);
@@ -197,12 +205,13 @@ impl Span {
     }
 }
 
-/// Bits that the nearest depth is cut to for an affine map. All over the screen that moves a
-/// coordinate by less than 256 texels and 560 pixels over the 2^32 that the middle one has at
-/// least: 3 units of 2^-16.
+/// Bits to which the nearest depth is reduced for an affine map. That moves a coordinate by less
+/// than 3 units of 2^-16 texel anywhere on the screen: each coefficient is off by less than one,
+/// which counts for at most 560 pixels (width and height) and 256 texels, and the middle depth is
+/// at least 2^32, so the coordinate moves by less than 256 x 560 / 2^32 texel.
 const DEPTH_BITS: u32 = 34;
 
-/// The affine map of a polygon, if it keeps to `tolerance` in all of it.
+/// Returns the affine map of a polygon, if the map keeps to `tolerance` everywhere in the polygon.
 fn flat(
     polygon: &[Vertex],
     span: &Span,
@@ -211,14 +220,15 @@ fn flat(
     texture: &Texture<'_>,
     tolerance: Tolerance,
 ) -> Option<Map> {
-    // A face that is seen at a glancing angle has no such depths; it is not flat.
+    // A face with smaller depths is seen at a glancing angle; it is not flat.
     let cut = (64 - DEPTH_BITS).checked_sub(near.leading_zeros())?;
     let over_middle = Reciprocal::new((near + far) >> 1 >> cut);
-    // Half of what c changes by, against the least: 32 fraction bits.
+    // Half of the change of c, relative to the least c: 32 fraction bits.
     let lean = Above::new(Reciprocal::new(far)).lean(((near - far) >> 1) + 1);
     let (mut off, mut inside) = (0, true);
     let mut gradient = |n: &Form, about: i32, last: i32| {
-        // Any would do; of an illegal face's the product would not fit.
+        // Any f0 is correct. Clamp it, because the product with an illegal face's coordinate would
+        // not fit.
         let about = i64::from(about.clamp(0, last));
         let mut wide = 0;
         let mut slope = |n: i64, c: i64| {
@@ -229,7 +239,8 @@ fn flat(
         let right = slope(n.right, plane.c.right);
         let down = slope(n.down, plane.c.down);
         let origin = slope(n.origin, plane.c.origin);
-        // More texels a pixel than 2^8, or than 2^11 in all, have no place on a face that is flat.
+        // A flat face never has more than 2^8 texels per pixel (tested here) or 2^11 texels in all
+        // (tested in `slope`).
         wide |= (right ^ right >> 63 | down ^ down >> 63) >> 40;
         if wide != 0 {
             return None;
@@ -244,23 +255,23 @@ fn flat(
         let change = high.max(-low);
         let bent = (u128::from(change as u64) * u128::from(lean)) >> 32;
         let (low, high) = (low + about, high + about);
-        // What walks are clamped by, and what the reciprocal's 31 bits leave.
+        // The amount by which walks are clamped, and the error of the reciprocal's 31 bits.
         let outside = (-low).max(high - i64::from(last)).max(0);
         off = off.max(bent as i64 + outside + (change >> 28));
-        // 3 2^-16 texel at the first pixel.
+        // A coordinate is off by up to 3 2^-16 texel at the first pixel.
         inside &= low >= 4 && high < i64::from(last) - 4;
         Some((origin + (about << 16), right, down))
     };
     let last = texture.last();
     let u = gradient(&plane.a, span.about[0], last.0)?;
     let v = gradient(&plane.b, span.about[1], last.1)?;
-    // The step is cut at every pixel, the first coordinate and the forms once.
+    // The step is cut once per pixel; the first coordinate and the forms are cut once per span.
     let [_, top, _, bottom] = span.borders;
     let rounded = i64::from((bottom - top) >> 8) + 7;
     (off + rounded <= tolerance.units().into()).then(|| Map::of([u, v], texture, inside))
 }
 
-/// What maps a polygon's runs within an error.
+/// Maps a polygon's spans within an error.
 #[derive(Clone, Copy, Debug)]
 pub struct Within {
     plane: Plane,
@@ -268,20 +279,20 @@ pub struct Within {
     by: By,
 }
 
-/// How a polygon's runs go, and what is known of all of them.
+/// The direction of a polygon's spans, and what holds for all of them.
 #[derive(Clone, Copy, Debug)]
 enum By {
     /// Columns of one affine map.
     Map(Map),
-    /// Columns. In none of them the texture passes faster than here; a pixel for each of the
-    /// longest's is taken off the tolerance.
+    /// Columns. The chords use the largest |D| of all columns, and the tolerance is reduced by one
+    /// unit for each pixel of the longest column.
     Columns(Option<Chords>),
     /// Rows.
     Rows,
 }
 
 impl Within {
-    /// That of a polygon whose texture lies in `plane`.
+    /// Returns the mapper of a polygon whose texture lies in `plane`.
     #[inline]
     pub fn new(
         polygon: &[Vertex],
@@ -312,7 +323,7 @@ impl Within {
         }
     }
 
-    /// The one affine map of all columns, if there is one.
+    /// Returns the single affine map of all columns, if one keeps to the tolerance.
     pub fn map(&self) -> Option<&Map> {
         match &self.by {
             By::Map(map) => Some(map),
@@ -320,7 +331,7 @@ impl Within {
         }
     }
 
-    /// How the runs go.
+    /// Returns the direction of the spans.
     pub fn axis(&self) -> Axis {
         match self.by {
             By::Rows => Axis::Right,
@@ -328,15 +339,16 @@ impl Within {
         }
     }
 
-    /// Makes the walks of runs, which are those of the polygon along that axis, one after the
-    /// other.
+    /// Returns a function that makes the walk of each span. Call it with the polygon's spans along
+    /// [`Within::axis`], one after the other.
     pub fn walks<'t>(&'t self, texture: &'t Texture<'t>) -> impl FnMut(&Run<()>) -> job::Walk + 't {
         let Self {
             plane,
             tolerance,
             by,
         } = self;
-        // A run as long as one that was no line is not tried: neighbours are alike.
+        // A span that is at least as long as one that failed to be a line is not tried: neighbours
+        // are alike.
         let mut too_long = u16::MAX;
         move |run| {
             let (axis, (x, y)) = match by {
@@ -363,16 +375,16 @@ impl Within {
     }
 }
 
-/// Below so many pixels a run has few pieces, whichever way it goes.
+/// Below this number of pixels a span has few pieces in either direction.
 const SHORT: u16 = 32;
 
-/// The axis along which a polygon's lines take less, in the sum of its corners.
+/// Returns the axis along which a polygon's lines cost less, summed over its corners.
 fn axis(polygon: &[Vertex], span: &Span, plane: &Plane, tolerance: Tolerance) -> Axis {
     let [(left, top), (right, bottom)] = span.pixels();
     if right - left < SHORT && bottom - top < SHORT {
         return Axis::Down;
     }
-    // In 1/256 of what a pixel of a line takes.
+    // In 1/256 of the cost of a line's pixel.
     let cost = |axis: Axis, steps: u16, piece: u32, (x, y): (u16, u16)| {
         let walk = Walk::new(plane, axis, x, y);
         let (depth, exact) = (walk.at[2], EXACT << 8);

@@ -1,5 +1,5 @@
-//! The affine mapper's walks: coordinates against the one affine map of a triangle. Which pixels
-//! they cover is the oracle's to say (`tests/oracle`).
+//! The affine mapper's walks: compares their coordinates with the single affine map of a triangle. The oracle
+//! checks which pixels they cover (`tests/oracle`).
 
 use std::collections::HashMap;
 
@@ -7,9 +7,9 @@ use texmap::affine::{Map, Sides, Walk};
 use texmap::coverage::{self, Axis, Dropped, Run};
 use texmap::{Texture, Vertex};
 
-/// How the walk down a run is made.
+/// Makes the walk down a span.
 type Walker = Box<dyn Fn(&Run) -> Walk>;
-/// That of a polygon; nothing if the rule is not for it.
+/// Makes a polygon's walker; `None` if the rule does not apply to the polygon.
 type Rule = fn(&[Vertex], &Texture<'_>) -> Option<Walker>;
 
 fn by_sides(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
@@ -35,7 +35,7 @@ fn walks(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Run, Wal
     walks
 }
 
-/// Pixels of `polygon`, each with its coordinates; panics on one outside the texture.
+/// Pixels of `polygon`, each with its coordinates; panics on a coordinate outside the texture.
 fn drawn(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> HashMap<(i32, i32), (i32, i32)> {
     let (last_u, last_v) = texture.last();
     let mut pixels = HashMap::new();
@@ -66,7 +66,7 @@ fn vertex(
     Vertex {
         x: place(random, centre.0),
         y: place(random, centre.1),
-        // Whole texels, both borders among them.
+        // Whole texels, including both borders.
         u: random.i32(0..=size.0.into()) << 16,
         v: random.i32(0..=size.1.into()) << 16,
     }
@@ -78,13 +78,13 @@ fn every_walk_stays_inside_the_texture() {
     let texels = vec![0; 256 * 256];
     let (mut pixels, mut mapped) = (0, 0);
     for case in 0..seeded::cases(20_000) {
-        // The middle of the screen, its corners, and spreads from a pixel to beyond the screen.
+        // The centre of the screen, its corners, and spreads from a pixel to beyond the screen.
         let centre = [(160, 120), (0, 0), (319, 239), (319, 0)][case % 4];
         let centre = (centre.0 * 256 + 128, centre.1 * 256 + 128);
         let spread = [256, 1024, 4096, 16384][case / 4 % 4];
         let snap = [1, 64, 128, 256][case / 16 % 4];
         let sides = random.usize(3..=8);
-        // The least, the largest, the narrowest, powers of two and not.
+        // The smallest texture, the largest, the narrowest, powers of two and other sizes.
         let size = [(1, 1), (256, 256), (256, 1), (1, 255), (64, 16), (3, 100)][case % 6];
         let texels = &texels[..usize::from(size.0) * usize::from(size.1)];
         let texture = Texture::new(texels, size.0, size.1).unwrap();
@@ -137,15 +137,15 @@ fn a_triangle_has_its_one_affine_map() {
             drawn(&polygon, &texture, by_sides),
             drawn(&polygon, &texture, by_map),
         );
-        // 1/128 texel: 2^-8 where a texture is squeezed into a sliver, and 60 pixels of step, each
-        // cut by less than 2^-16. A map has no more than its 3 2^-16 beside the steps'.
+        // 1/128 texel: 2^-8 where a texture is squeezed into a sliver, and 60 pixels of step, each rounded by
+        // less than 2^-16. A map adds only 3 2^-16 to the steps' error.
         let walks = sides.into_iter().map(|at| (0, at, 512));
         for (rule, ((x, y), (u, v)), bound) in walks.chain(map.into_iter().map(|at| (1, at, 63))) {
             let (dx, dy) = (
                 i128::from(x) * 256 + 128 - a[0],
                 i128::from(y) * 256 + 128 - a[1],
             );
-            // Barycentric weights of b and c, over `area`.
+            // Barycentric weights of b and c, times `area`.
             let wb = dx * (c[1] - a[1]) - dy * (c[0] - a[0]);
             let wc = dy * (b[0] - a[0]) - dx * (b[1] - a[1]);
             for (k, actual) in [(2, u), (3, v)] {
@@ -162,8 +162,8 @@ fn a_triangle_has_its_one_affine_map() {
     );
 }
 
-/// No swimming: moved by 1/256 pixel, a texture moves under each pixel by what that is worth and
-/// no more than the mapper's own error twice.
+/// No swimming: if a texture moves by 1/256 pixel, the coordinates at each pixel change by the corresponding
+/// amount, within twice the mapper's error.
 #[test]
 fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
     let mut random = seeded::generator();
@@ -195,7 +195,7 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
                 continue;
             };
             for (k, before, after) in [(2, u, u_after), (3, v, v_after)] {
-                // The coordinate's change over `area` when the triangle moves by (dx, dy).
+                // The coordinate's change times `area` when the triangle moves by (dx, dy).
                 let across = (b[k] - a[k]) * (c[1] - a[1]) - (c[k] - a[k]) * (b[1] - a[1]);
                 let down = (c[k] - a[k]) * (b[0] - a[0]) - (b[k] - a[k]) * (c[0] - a[0]);
                 let worth = -(across * i128::from(dx) + down * i128::from(dy));
@@ -212,8 +212,8 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
     );
 }
 
-/// The corners of the legal range: a half of the texture's width to the pixel, a corner as far out
-/// as it may be, a hair of an area. One step further there is no map.
+/// The limits of the legal range: half of the texture's width to the pixel, a corner as far out as allowed, a
+/// tiny area. One step further no map exists.
 #[test]
 fn a_map_holds_at_the_ends_of_its_range() {
     let texels = vec![0; 256 * 256];
@@ -229,7 +229,7 @@ fn a_map_holds_at_the_ends_of_its_range() {
         (left, bottom, side, side),
     ];
     let drawn = drawn(&triangle(widest), &texture, by_map);
-    // Its long side goes through the middle of the screen.
+    // The triangle's long side goes through the centre of the screen.
     assert!(drawn.len() > modex::WIDTH * modex::HEIGHT * 2 / 5);
     for corner in 0..3 {
         for (x, y) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
@@ -251,7 +251,7 @@ fn a_map_holds_at_the_ends_of_its_range() {
             assert!(by_map(&steep((257 * x, 257 * y), u), &texture).is_some());
         }
     }
-    // Nothing in it, and nothing but three sides.
+    // An empty triangle, and a polygon that is not a triangle.
     assert!(
         by_map(
             &triangle([(0, 0, 0, 0), (256, 256, 0, 0), (512, 512, 0, 0)]),

@@ -1,6 +1,6 @@
-//! The mappers that go by depth: where it is constant, along which it changes less, and by tiles
-//! of it. Truth is the quotient of the plane's integers at the pixel's centre, clamped into the
-//! texture.
+//! The mappers that follow the depth: the direction in which it is constant, the axis along which it changes
+//! less, and tiles. The reference is the quotient of the plane's integers at the pixel's centre, clamped to
+//! the texture.
 
 mod faces;
 
@@ -12,18 +12,18 @@ use texmap::{Face, Job, Mapper, Texture, Vertex, Walk, free, level, tiles};
 use faces::*;
 
 const SIZE: (u16, u16) = (256, 200);
-/// A quarter of a texel, 16.16: errors that are not fixed point's.
+/// A quarter of a texel, 16.16: errors that do not come from fixed point.
 const QUARTER: f64 = 16384.0;
 const MAPPERS: [Mapper; 4] = [Mapper::Level, Mapper::Free, Mapper::Nearer, Mapper::Tiles];
 
-/// A triangle seen: its corners on the screen and in space.
+/// A visible triangle: its corners on the screen and in space.
 struct Triangle {
     polygon: Vec<Vertex>,
     anchors: [Anchor; 3],
 }
 
 impl Triangle {
-    /// Of three corners: pixels from the screen's middle, and depths, 16.16.
+    /// A triangle from its corners: pixels from the screen's centre, and depths, 16.16.
     fn new(corners: [(f64, f64, i32); 3], texture: [(i32, i32); 3]) -> Self {
         let anchors = [0, 1, 2].map(|i| {
             let ((x, y, z), (u, v)) = (corners[i], texture[i]);
@@ -54,8 +54,8 @@ impl Triangle {
         Self { polygon, anchors }
     }
 
-    /// Its plane seen through two rectangles, which a side joins that is walked there and back: the
-    /// columns between have no pixel, and where the rectangles face each other rows have two runs.
+    /// The triangle's plane seen through two rectangles, joined by a side that is walked there and back. The
+    /// columns between have no pixel, and where the rectangles face each other, rows have two spans.
     fn through_windows(mut self, random: &mut fastrand::Rng) -> Self {
         let (x, y) = (random.i32(0..150), random.i32(0..100));
         let (gap, tall) = (random.i32(1..40), random.i32(40..100));
@@ -72,7 +72,7 @@ impl Triangle {
         self
     }
 
-    /// Anywhere on the screen and a little beyond, the depths' ratio up to 2^`octaves`.
+    /// A triangle anywhere on the screen and a little beyond, with a depth ratio of up to 2^`octaves`.
     fn any(random: &mut fastrand::Rng, octaves: f64) -> Self {
         let corner = |random: &mut fastrand::Rng| {
             let at = |random: &mut fastrand::Rng, reach: i32| f64::from(random.i32(-reach..=reach));
@@ -102,16 +102,16 @@ fn at(form: &Form, x: f64, y: f64) -> f64 {
     form.origin as f64 + form.right as f64 * x + form.down as f64 * y
 }
 
-/// u or v at any place of the screen, 16.16, wherever it lies; none where it is not seen.
+/// u or v at any point of the screen, 16.16, not clamped; `None` where the plane is not visible.
 fn quotient(plane: &Plane, k: usize, x: f64, y: f64) -> Option<f64> {
     let c = at(&plane.c, x, y);
     let n = at([&plane.a, &plane.b][k], x, y);
     (c > 0.0).then(|| n / c * 65536.0)
 }
 
-/// Compares the coordinates of every pixel of a face with the exact ones. `bound` is what they may
-/// be off, for u or v at a pixel and its number in its job, if there is a limit. Pixels, and the
-/// worst error as a part of its bound, of those bounds that are `least` or more.
+/// Compares the coordinates of every pixel of a face with the exact ones. `bound` returns the largest allowed
+/// error for u or v (0 or 1), at a pixel and its number in its job, if a limit exists. Returns the number of
+/// pixels, and the worst error as a fraction of its bound, among bounds of at least `least`.
 fn compare(
     mapper: Mapper,
     least: f64,
@@ -149,7 +149,7 @@ fn compare(
     (pixels, worst)
 }
 
-/// A wall has a side that goes straight down in space, a floor one that goes straight across.
+/// A triangle in a wall, with a side straight down in space, or in a floor, with a side straight across.
 fn level_triangle(random: &mut fastrand::Rng, wall: bool, upright: bool) -> Triangle {
     let mut triangle = Triangle::any(random, 3.0);
     let [a, b, _] = &mut triangle.anchors;
@@ -184,12 +184,12 @@ fn a_wall_and_a_floor_are_exact_but_for_drift() {
                     affine += 1;
                     assert!(!(wall && upright), "{walk:?} steps both");
                 }
-                // What windows show may lie beyond the horizon.
+                // A window may show points beyond the horizon.
                 _ => exact += u32::from(case % 5 != 0),
             }
         }
         let (more, most) = compare(Mapper::Level, 20.0, &triangle, |_, _, _, (x, y), _| {
-            // A run's pixels are counted before it is cut: no more than these.
+            // A span's pixels are counted before it is cut: never more than this.
             Some(f64::from(level::drift(if wall { y } else { x })))
         });
         (pixels, worst) = (pixels + more, worst.max(most));
@@ -198,7 +198,7 @@ fn a_wall_and_a_floor_are_exact_but_for_drift() {
     println!("{walls} walls, {affine} affine and {exact} exact runs");
     if seeded::is_whole() {
         assert!(pixels > 500_000 && worst > 0.8 && walls > 2_000 && affine > 5_000);
-        // Nothing that a wall needs is left to the exact mapper.
+        // Hardly any of a wall's visible spans are left to the exact mapper.
         assert!(exact < affine / 100);
     }
 }
@@ -220,7 +220,7 @@ fn where_no_depth_is_constant_level_is_exact() {
     assert!(planes > 40);
 }
 
-/// How far u or v may move when the place moves by [`free::ASIDE`] across the line.
+/// How far u or v moves when the point moves by [`free::ASIDE`] across the line.
 fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64> {
     let (x, y) = (f64::from(x), f64::from(y));
     let here = quotient(plane, k, x, y)?;
@@ -270,8 +270,8 @@ fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewher
     }
 }
 
-/// Along a line nothing changes but what the texture's axes bring: half a pixel is the only error,
-/// so a line that goes along rows or columns has none.
+/// Along a line of constant depth the only error is the half pixel across it, so a line along rows or columns
+/// has no error but drift.
 #[test]
 fn a_free_line_without_slope_goes_through_the_centres() {
     let mut random = seeded::generator();
@@ -283,7 +283,8 @@ fn a_free_line_without_slope_goes_through_the_centres() {
     }
 }
 
-/// |du| (sqrt r - 1)/(sqrt r + 1): linear interpolation between two places.
+/// The error of linear interpolation between two points whose depth ratio is r: |du| (sqrt r - 1)/(sqrt r +
+/// 1).
 fn linear(plane: &Plane, k: usize, (x, y): (f64, f64), (to_x, to_y): (f64, f64)) -> Option<f64> {
     let du = quotient(plane, k, to_x, to_y)? - quotient(plane, k, x, y)?;
     let (c, to_c) = (at(&plane.c, x, y), at(&plane.c, to_x, to_y));
@@ -296,7 +297,7 @@ fn tiles_are_off_by_what_their_edge_and_their_column_are_and_by_that_somewhere()
     let mut random = seeded::generator();
     let (mut pixels, mut affine, mut exact, mut worst) = (0, 0, 0, 0f64);
     for case in 0..seeded::cases(160) {
-        // Without a change of depth only fixed point is left.
+        // Without a change of depth, the only error is that of fixed point.
         let mut triangle = Triangle::any(&mut random, [0.0, 1.0, 3.0, 6.0][case % 4]);
         if case % 5 == 0 {
             triangle = triangle.through_windows(&mut random);
@@ -370,7 +371,7 @@ fn nearer_goes_the_way_in_which_depth_changes_less() {
     assert!(ways.iter().all(|&ways| ways > 40), "{ways:?}");
 }
 
-/// Any polygon with any plane, seen or not: no fault, each pixel once, every texel the texture's.
+/// Any polygon with any plane, visible or not: no fault, each pixel once, every texel inside the texture.
 #[test]
 fn whatever_the_plane_is_coverage_stays_and_every_texel_is_inside() {
     let mut random = seeded::generator();
@@ -395,7 +396,7 @@ fn whatever_the_plane_is_coverage_stays_and_every_texel_is_inside() {
     assert!(!seeded::is_whole() || pixels > 1_000_000);
 }
 
-/// The horizon through the middle of the picture, and the plane seen from behind.
+/// The horizon through the centre of the frame, and the plane seen from behind.
 #[test]
 fn on_the_horizon_and_beyond_it_nothing_is_at_fault() {
     let screen = [(0, 0), (320, 0), (320, 240), (0, 240)].map(|(x, y)| Vertex {

@@ -1,11 +1,11 @@
-//! The exact mapper against its definition, in integers twice as wide; and its quantised plane
-//! against the real one. What a sweep of texels finds is pasted in here.
+//! Checks the exact mapper against its definition, in integers twice as wide; and its quantised plane against
+//! the exact plane. Failures that a sweep of texels finds are pasted in here.
 
 use oracle::plane::{Checker, Compared, FOCAL_LENGTH, Mix, anchor};
 use oracle::texel::forms;
 use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING};
 
-/// Cases of each mix: half a second of what `cargo sweep --only texels` does.
+/// Cases of each mix: as many as `cargo sweep --only texels` runs in half a second.
 const CASES: u64 = 1500;
 
 #[test]
@@ -44,9 +44,9 @@ fn every_texel_is_the_floor_of_the_quotient() {
     }
 }
 
-/// The forms are the real ones, cut by one shift, and off by no more than [`ROUNDING`]. So
-/// |a' / c' - a / c| is at most ROUNDING (1 + u) / c', u in texels: what the numerator is off, and
-/// what the denominator is off times the quotient.
+/// The plane's forms are the exact forms after one shift, with an error of at most [`ROUNDING`]. So |a' / c'
+/// - a / c| is at most ROUNDING (1 + u) / c', u in texels: the numerator's error, plus the denominator's
+/// error times the quotient.
 #[test]
 fn cutting_the_plane_moves_no_form_by_more_than_its_bound() {
     let mut random = seeded::generator();
@@ -65,7 +65,7 @@ fn cutting_the_plane_moves_no_form_by_more_than_its_bound() {
         let fits = (0..48).any(by);
         assert!(fits, "({x}, {y}) of {anchors:?}: {cut:?} of {real:?}");
         let [a, _, c] = real;
-        // Where the polygon may be seen.
+        // Where the polygon may be visible.
         if c > 0 && (0..256 * c).contains(&a) && cut[2] > 1 << 20 {
             let off = (a as f64 / c as f64 - cut[0] as f64 / cut[2] as f64).abs();
             worst = worst.max(off);
@@ -81,7 +81,7 @@ fn a_corner_of_the_polygon_has_its_own_coordinates() {
     let mut random = seeded::generator();
     for _ in 0..10_000 {
         let mut anchors = [(); 3].map(|()| anchor(&mut random, 14, 20, (256, 256)));
-        // The first of them on a pixel's centre.
+        // The first anchor is on a pixel's centre.
         let (x, y) = (random.u16(0..320), random.u16(0..240));
         let z = 2 * FOCAL_LENGTH * random.i32(64..8192);
         let scale = z / (2 * FOCAL_LENGTH);
@@ -92,7 +92,7 @@ fn a_corner_of_the_polygon_has_its_own_coordinates() {
         ];
         let [a, b, c] = forms(&anchors, FOCAL_LENGTH, x, y);
         let (u, v) = (i128::from(anchors[0].u), i128::from(anchors[0].v));
-        // All of the weight is the first point's.
+        // The first point has all of the weight.
         assert_eq!((a << 16, b << 16), (u * c, v * c));
         assert!(c >= 0);
         let plane = Plane::new(&anchors, FOCAL_LENGTH);

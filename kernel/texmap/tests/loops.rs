@@ -1,5 +1,5 @@
-//! The affine column loops against their clear twin, texel by texel, and nothing written beside
-//! the column.
+//! Compares the affine column loops with their reference implementation, texel by texel, and checks that they
+//! write nothing outside the column.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::NonNull;
@@ -10,13 +10,13 @@ use texmap::loops::Loop;
 use texmap::plane::Anchor;
 use texmap::{Face, Mapper, Texture, Vertex};
 
-/// No texel has this colour: what is not drawn keeps it.
+/// No texel has this colour: pixels that are not drawn keep it.
 const UNTOUCHED: u8 = 0;
 
 /// The loops that wrap any walk around.
 const MASKED: [Loop; 3] = [Loop::Shifts, Loop::Joined, Loop::Extract];
 
-/// How a column is drawn: in instructions, or portably.
+/// Draws a column, with tuned instructions or portably.
 type Draw = fn(Loop, &Texture<'_>, Walk, Column<'_>);
 const DRAWS: [(&str, Draw); 2] = [("column", Loop::column), ("portable", Loop::portable)];
 
@@ -47,8 +47,8 @@ fn side(random: &mut fastrand::Rng) -> u16 {
     }
 }
 
-/// A start and a step that stay inside `size` texels for `len` pixels: whole texels, no fractions,
-/// borders and no step at all more often than chance would have them.
+/// A start and a step that stay inside `size` texels for `len` pixels. Whole texels, zero fractions, borders
+/// and zero steps are more frequent than by chance.
 fn legal(random: &mut fastrand::Rng, size: u16, len: u16) -> (i32, i32) {
     let last = (i32::from(size) << 16) - 1;
     let mut place = || match random.u8(..6) {
@@ -60,15 +60,15 @@ fn legal(random: &mut fastrand::Rng, size: u16, len: u16) -> (i32, i32) {
     };
     let (start, end) = (place(), place());
     if len == 1 {
-        // Nobody takes this step.
+        // This step is never used.
         return (start, random.i32(-1 << 24..1 << 24));
     }
     let step = (end - start) / i32::from(len - 1);
     match random.u8(..5) {
         0 => (start, 0),
-        // Cut towards zero, to whole texels.
+        // Rounded towards zero, to whole texels.
         1 => (start, step / 0x1_0000 * 0x1_0000),
-        // One bit.
+        // A step of one unit of the last place.
         2 => (
             start.clamp(240.min(last), (last - 240).max(0)),
             step.signum(),
@@ -97,7 +97,7 @@ fn legal_walk(random: &mut fastrand::Rng, texture: &Texture<'_>, len: u16) -> Wa
     }
 }
 
-/// The texel of pixel `i`, from the definition; around the padding, where that is asked.
+/// The texel of pixel `i`, from the definition; coordinates outside wrap around the padded sides.
 fn texel(texture: &Texture<'_>, walk: Walk, i: usize) -> u8 {
     let at = |at: i32, step: i32| (i64::from(at) + i as i64 * i64::from(step)) >> 16;
     let (column, row) = (at(walk.u, walk.du), at(walk.v, walk.dv));
@@ -108,7 +108,7 @@ fn texel(texture: &Texture<'_>, walk: Walk, i: usize) -> u8 {
     texture.texels()[row * pitch + column]
 }
 
-/// Draws a column on an untouched page and compares all of the page.
+/// Draws a column on an untouched page and compares the whole page.
 fn check(
     draw: (&str, Draw),
     by: Loop,
@@ -146,7 +146,7 @@ fn check(
     expected.planes[plane].fill(UNTOUCHED);
 }
 
-/// An untouched page, what it ought to become, and where.
+/// An untouched page, its expected result, and a column's place.
 struct Page {
     place: (u16, u16),
     drawn: PlanarBuffer,
@@ -165,7 +165,7 @@ impl Page {
         }
     }
 
-    /// Somewhere for a column of `len` pixels.
+    /// Chooses a place for a column of `len` pixels.
     fn anywhere(&mut self, random: &mut fastrand::Rng, len: u16) -> &mut Self {
         let top = random.u16(0..=HEIGHT as u16 - len);
         self.place = (random.u16(0..WIDTH as u16), top);
@@ -179,7 +179,7 @@ fn every_loop_draws_its_clear_twin() {
     let texels = all_texels(random);
     let mut page = Page::new();
     for case in 0..seeded::cases(4000) as u16 {
-        // Every height, and then any.
+        // Every height once, then random heights.
         let len = if case < 240 {
             case + 1
         } else {
@@ -196,8 +196,8 @@ fn every_loop_draws_its_clear_twin() {
     }
 }
 
-/// A step whose whole part is negative and whose fraction is zero has no carry; as one number with
-/// the fraction it would seem to have one at every pixel.
+/// A step with a negative whole part and a zero fraction has no carry. If whole part and fraction were one
+/// number, it would seem to have a carry at every pixel.
 #[test]
 fn a_negative_whole_step_carries_nothing() {
     let random = &mut seeded::generator();
@@ -246,7 +246,7 @@ fn masked_loops_wrap_any_walk_around_the_padding() {
         let size = (side(random), side(random));
         let texture = texture(&texels, size, true);
         let mut any = || match case % 4 {
-            // The seeds' case: small negative steps from inside, which leave at 0.
+            // The case of the sources: small negative steps from inside, which leave at 0.
             0 => random.i32(-0x2_0000..0x1_0000),
             1 => random.i32(-0x200..=0x200) << 16,
             2 => [i32::MIN, i32::MAX, -1, 0, 1][random.usize(..5)],
@@ -307,7 +307,8 @@ fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
     }
 }
 
-/// A packed walk is off by a bit more at every pixel, and no further outside than it was.
+/// A packed walk's error grows by at most one unit of the last place at every pixel, and the walk stays
+/// inside the texture.
 #[test]
 fn a_packed_walk_drifts_within_its_bound() {
     let random = &mut seeded::generator();
@@ -329,7 +330,7 @@ fn a_packed_walk_drifts_within_its_bound() {
             worst = worst.max(off.abs());
         }
     }
-    // It does drift: that is why the twin has to know.
+    // The walk does drift, so the reference implementation has to know about it.
     assert!(worst > 200, "{worst}");
     for by in Loop::ALL {
         let walk = Walk {
@@ -342,7 +343,7 @@ fn a_packed_walk_drifts_within_its_bound() {
     }
 }
 
-/// The registers' spare bits are counted for the longest column that there can be.
+/// The registers have enough spare bits for the longest possible column.
 #[test]
 fn the_longest_column_spills_nothing() {
     let random = &mut seeded::generator();
@@ -357,7 +358,7 @@ fn the_longest_column_spills_nothing() {
         (0, 256, last, -256),
         (last, -256, 0, 255),
         (last, 0, last, 0),
-        // These only the masked loops can draw.
+        // Only the masked loops can draw these.
         (last, -1, last, -1),
         (last, last, 0, -1),
     ] {
@@ -368,7 +369,7 @@ fn the_longest_column_spills_nothing() {
             }
             for (name, draw) in DRAWS {
                 let base = NonNull::from(&mut bytes[..]).cast();
-                // SAFETY: `bytes` has STRIDE bytes for every pixel, and nobody else looks.
+                // SAFETY: `bytes` has STRIDE bytes for every pixel, and nothing else accesses it.
                 draw(by, &texture, walk, unsafe { Lane::new(base, len) });
                 let taken = by.walk(walk);
                 for i in 0..usize::from(len) {
@@ -400,7 +401,7 @@ fn an_empty_column_is_not_drawn() {
     let mut byte = UNTOUCHED;
     for by in Loop::ALL {
         for (_, draw) in DRAWS {
-            // SAFETY: it has no pixels.
+            // SAFETY: the lane has no pixels.
             let none = unsafe { Lane::new(NonNull::from(&mut byte), 0) };
             draw(by, &Texture::DOT, Walk::default(), none);
         }
@@ -408,7 +409,7 @@ fn an_empty_column_is_not_drawn() {
     assert_eq!(byte, UNTOUCHED);
 }
 
-/// Whole faces by name: what a job draws is what it says that it reads.
+/// Whole faces, mapped by name: a job draws the texels that it says it reads.
 #[test]
 fn jobs_say_what_every_loop_reads() {
     let random = &mut seeded::generator();

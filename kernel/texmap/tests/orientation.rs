@@ -1,21 +1,21 @@
-//! Chapter 57's complaint: a texture shifts as its polygon turns. Here a parallelogram turned by
-//! quarters of a turn, or mirrored, gives the turned or mirrored picture, but for pixels whose
-//! centre lies on an edge or on a texel's border: there the half-open rules choose a side, and the
-//! side does not turn along.
+//! Chapter 57's complaint: a texture shifts as its polygon turns. Here a parallelogram that is turned by
+//! quarters of a turn, or mirrored, must give the turned or mirrored image. The exceptions are pixels whose
+//! centre lies on an edge or on a texel's border: there the half-open rules choose a side, and the side does
+//! not turn with the image.
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, Mapper, Order, Renderer, SUBPIXELS, Texture, Vertex};
 
-/// The middle of the screen in 1/256 pixel, about which everything turns.
+/// The centre of the screen in 1/256 pixel, about which everything turns.
 const MIDDLE: (i32, i32) = (160 * SUBPIXELS, 120 * SUBPIXELS);
 const FOCAL_LENGTH: i32 = 258;
-/// 16.16 in space for 1/256 pixel on the screen, all of it at one depth.
+/// 16.16 in space for 1/256 pixel on the screen, at a single depth.
 const SCALE: i32 = 16;
 const DEPTH: i32 = FOCAL_LENGTH * SUBPIXELS * SCALE;
 const SIDE: u16 = 24;
 
-/// From the middle of the screen.
+/// A position relative to the centre of the screen.
 type Place = (i32, i32);
 type Turn = fn(Place) -> Place;
 
@@ -36,7 +36,7 @@ const COORDINATES: [(i32, i32); 4] = [(0, 0), (1, 0), (1, 1), (0, 1)];
 
 /// Draws the parallelogram; 0 where nothing is drawn.
 fn draw(corners: &Corners, by: Mapper) -> PlanarBuffer {
-    // No two neighbours of a texel, nor itself turned, are like it.
+    // Every texel differs from its neighbours and from its own turned position.
     let texels: Vec<u8> = (0..SIDE * SIDE).map(|i| (i % 251 + 1) as u8).collect();
     let texture = Texture::new(&texels, SIDE, SIDE).unwrap();
     let along = |i: usize| {
@@ -67,8 +67,8 @@ fn draw(corners: &Corners, by: Mapper) -> PlanarBuffer {
     page
 }
 
-/// Whether a pixel's centre lies on an edge, or on a border between texels. All at one depth, the
-/// coordinates are affine: u texels at the centre are (centre - P) x N / (M x N), times SIDE.
+/// Whether a pixel's centre lies on an edge, or on a border between texels. At a single depth the coordinates
+/// are affine: u at the centre, in texels, is (centre - P) x N / (M x N), times SIDE.
 fn on_a_border(corners: &Corners, centre: Place) -> bool {
     let minus = |a: Place, b: Place| (i64::from(a.0 - b.0), i64::from(a.1 - b.1));
     let cross = |a: (i64, i64), b: (i64, i64)| a.0 * b.1 - a.1 * b.0;
@@ -80,13 +80,13 @@ fn on_a_border(corners: &Corners, centre: Place) -> bool {
         .any(|part| part * i64::from(SIDE) % area == 0)
 }
 
-/// Pixels, those of them that are other ones when turned though no border is near, and those on a
+/// Counts the pixels; those that change with the turn although no border is near; and those that change on a
 /// border.
 fn compare(by: Mapper, cases: usize) -> [u32; 3] {
     let mut random = seeded::generator();
     let (mut pixels, mut others, mut ties) = (0, 0, 0);
     for case in 0..seeded::cases(cases) {
-        // Whole pixels and halves of them bring ties.
+        // Whole and half pixels produce ties.
         let snap = [1, 128, 256][case % 3];
         let mut place = |reach: i32| {
             let mut at = || random.i32(-reach * SUBPIXELS..=reach * SUBPIXELS) / snap * snap;
@@ -109,7 +109,7 @@ fn compare(by: Mapper, cases: usize) -> [u32; 3] {
                 let there = turn(centre);
                 let [tx, ty] =
                     [there.0 + MIDDLE.0, there.1 + MIDDLE.1].map(|k| k.div_euclid(SUBPIXELS));
-                // A quarter's turn takes the screen's left and right out of it.
+                // A quarter turn moves the screen's left and right parts off the screen.
                 if !(0..WIDTH as i32).contains(&tx) || !(0..HEIGHT as i32).contains(&ty) {
                     continue;
                 }
@@ -142,7 +142,8 @@ fn a_turned_polygon_gives_the_turned_picture() {
     assert_eq!(others, 0);
 }
 
-/// Steps are cut towards zero, so a walk the other way is off the other way: by 2^-8 texel at most.
+/// Steps are rounded towards zero, so a walk in the other direction has the opposite error: at most 2^-8
+/// texel.
 #[test]
 fn affine_columns_shift_a_texture_by_next_to_nothing() {
     let [pixels, others, _] = compare(Mapper::default(), 150);
@@ -152,8 +153,8 @@ fn affine_columns_shift_a_texture_by_next_to_nothing() {
     );
 }
 
-/// The seeds' rule is much better than what it replaced, and still shifts a texture visibly: it
-/// shares coordinates out over whole pixels.
+/// The sources' rule is much better than the rule that it replaced, and still shifts a texture visibly: it
+/// distributes coordinates over whole pixels.
 #[test]
 fn half_steps_shift_a_texture_much_more() {
     let [pixels, others, _] = compare(Mapper::HalfStep, 150);

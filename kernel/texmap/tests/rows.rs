@@ -1,4 +1,4 @@
-//! The row mappers: one picture, three ways to reach the pixels; and what the half steps cost.
+//! The row mappers: three ways to reach the pixels give one frame. Also checks the error of the half steps.
 
 mod faces;
 
@@ -10,8 +10,8 @@ use faces::*;
 
 const ROWS: [Rows; 3] = [Rows::Multiply, Rows::Steps, Rows::Passes];
 
-/// Port writes of the three in the order of polygons: one a pixel, one a pixel, and one for each
-/// plane that a row touches.
+/// Port writes of the three mappers, polygon by polygon: one a pixel, one a pixel, and one for each plane
+/// that a row touches.
 #[test]
 fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
     let mut random = seeded::generator();
@@ -53,10 +53,10 @@ fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
     assert!(!seeded::is_whole() || one > 20 && begins.iter().chain(&ends).all(|&rows| rows > 100));
 }
 
-/// A pixel, its coordinates, and its number in the run.
+/// A pixel, its coordinates, and its number in the span.
 type Stepped = ((i64, i64), [i32; 2], u16);
 
-/// The coordinates by the half steps on each pixel of a triangle, along rows or columns.
+/// The coordinates by half steps at each pixel of a triangle, along rows or columns.
 fn half_steps(polygon: &[Vertex], texture: &Texture<'_>, axis: Axis) -> Vec<Stepped> {
     let sides = Sides::new(polygon, texture, axis).unwrap();
     let mut pixels = Vec::new();
@@ -75,7 +75,8 @@ fn half_steps(polygon: &[Vertex], texture: &Texture<'_>, axis: Axis) -> Vec<Step
     pixels
 }
 
-/// Half a pixel's worth of texture along the run, and the step's last bit for each pixel of it.
+/// The bound is half a pixel's change of the coordinate along the span, and the step's last bit for each
+/// pixel of it.
 #[test]
 fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
     let mut random = seeded::generator();
@@ -84,7 +85,7 @@ fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
     for axis in [Axis::Right, Axis::Down] {
         let (mut compared, mut worst) = (0, 0f64);
         for case in 0..seeded::cases(400) {
-            // On the screen, over its border, and far beyond.
+            // On the screen, across its border, and far beyond.
             let spread = [20, 150, 2_000][case % 3] * 256;
             let vertex = |random: &mut fastrand::Rng| Vertex {
                 x: 160 * 256 + random.i32(-spread..=spread),
@@ -95,7 +96,7 @@ fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
             let polygon = [(); 3].map(|()| vertex(&mut random));
             let [a, b, c] = polygon.map(|p| [p.x, p.y, p.u, p.v].map(f64::from));
             let area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
-            // Slivers say more of the crossings' own rounding.
+            // Slivers would show mainly the rounding of the crossings.
             if area.abs() < 65536.0 {
                 continue;
             }
@@ -111,8 +112,8 @@ fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
                     let exact = a[2 + k] + right * dx + down * dy;
                     let a_pixel = 256.0 * if axis == Axis::Right { right } else { down };
                     let off = (f64::from(actual[k]) - exact).abs();
-                    // 2^-23 pixel that the crossings are off is less than 2^-16 texel but where a
-                    // pixel is worth a whole texture.
+                    // The crossings' error of 2^-23 pixel is less than 2^-16 texel, except where a pixel
+                    // spans a whole texture.
                     let bound = (a_pixel / 2.0).abs() * (1.0 + 1e-5) + f64::from(i) + 4.0;
                     assert!(
                         off <= bound,
@@ -130,12 +131,12 @@ fn half_steps_are_off_by_half_a_pixel_at_most_and_by_that_somewhere() {
     }
 }
 
-/// A row whose polygon begins far off the screen stands where the same row does on it.
+/// A row whose polygon begins far off the screen has the same coordinates as the row on the screen.
 #[test]
 fn half_steps_lose_nothing_over_pixels_that_nobody_sees() {
     let texels = [0; 256];
     let texture = Texture::new(&texels, 256, 1).unwrap();
-    // 30 000 pixels for 256 texels: the step is cut by most of its last bit.
+    // 30 000 pixels for 256 texels: rounding removes most of the step's last bit.
     let far = [
         (-29_900, 0, 0),
         (100, 0, 256),

@@ -1,5 +1,5 @@
-//! Perspective by runs: what is drawn is what [`Job::pixels`] says, that stays inside the texture, and
-//! it is as near to the quotients as [`texmap::bounds`] says.
+//! Perspective by spans: the drawn texels are those of [`Job::pixels`], they stay inside the texture, and
+//! their error is within the bound of [`texmap::bounds`].
 
 mod random;
 
@@ -11,7 +11,7 @@ use texmap::plane;
 use texmap::runs::{Pieces, Reciprocal, over, quotients};
 use texmap::{Job, Mapper, Style, Texture, Walk};
 
-/// The mappers that draw in pieces, by name, and some more that have none in [`Mapper::ALL`].
+/// The mappers that draw in pieces, by name, and some more that are not in [`Mapper::ALL`].
 const MAPPERS: [(&str, Pieces, bool); 12] = [
     ("linear-2", Pieces::Of(2), true),
     ("linear-4", Pieces::Of(4), true),
@@ -142,9 +142,9 @@ fn what_is_drawn_are_the_texels_of_the_coordinates() {
     assert!(!seeded::is_whole() || compared > 1_000_000);
 }
 
-/// The first pixel of each piece, and the last of the run, have the quotient: the printed loops divide
-/// by end - start in one place and by end - start - 1 in another, and one of the two comes to its end a
-/// pixel too soon or too late.
+/// The first pixel of each piece, and the last pixel of the span, have the exact quotient. The loops in the
+/// sources divide by end - start in one place and by end - start - 1 in another, so one of the two reaches
+/// its end a pixel too soon or too late.
 #[test]
 fn pieces_meet_at_their_quotients_and_the_run_ends_at_its_own() {
     let mut random = seeded::generator();
@@ -160,7 +160,7 @@ fn pieces_meet_at_their_quotients_and_the_run_ends_at_its_own() {
                 let quotient = (plane::coordinate(a, c, 256), plane::coordinate(b, c, 256));
                 let is = pixels[usize::from(i)];
                 let off = (is.0 - quotient.0).abs().max((is.1 - quotient.1).abs());
-                // The last pixel is as many cut steps from the piece's start.
+                // The last pixel is that many rounded steps from the piece's start.
                 let drift = match i == len - 1 && mapper.2 {
                     true => i32::from(of) + 1,
                     false => 1,
@@ -175,7 +175,7 @@ fn pieces_meet_at_their_quotients_and_the_run_ends_at_its_own() {
     }
 }
 
-/// "Zero's paradox": the horizon in the run, and what lies beyond it.
+/// "Zero's paradox": the horizon inside the span, and pixels beyond it.
 #[test]
 fn on_the_horizon_and_beyond_nothing_is_divided_by_zero() {
     let texture = Texture::new(&[0; 256 * 64], 256, 64).unwrap();
@@ -201,7 +201,7 @@ fn on_the_horizon_and_beyond_nothing_is_divided_by_zero() {
                     }
                 }
             }
-            // c is zero at the last pixel, and at the first, and a end of the run sees it.
+            // c is zero at the last pixel, and at the first, so an end of the span meets it.
             for (at, step) in [(i64::from(len - 1) * one, -one), (0, one)] {
                 let walk = plane::Walk {
                     at: [one, one, at],
@@ -219,22 +219,22 @@ fn on_the_horizon_and_beyond_nothing_is_divided_by_zero() {
     assert_eq!(quotients([0, -1, 0], (last_u, last_v)), (last_u, 0));
 }
 
-/// How the errors of a mapper compare with its bound.
+/// A mapper's errors compared with its bound.
 #[derive(Default)]
 struct Errors {
-    /// The largest of runs inside the texture, in texels.
+    /// The largest error of spans inside the texture, in texels.
     worst: f64,
-    /// Error over bound, the largest, where the closed form is the bound: the run is inside, and it is
-    /// well below what the coordinate changes by.
+    /// The largest ratio of error to bound where the bound is the closed form: the span is inside the
+    /// texture, and the bound is well below the coordinate's change.
     closed: f64,
-    /// The same for all other runs.
+    /// The largest ratio of all other spans.
     other: f64,
-    /// Runs where the closed form is the bound, and their shares summed.
+    /// The number of spans where the bound is the closed form, and the sum of their ratios.
     runs: u32,
     sum: f64,
 }
 
-/// Measures a mapper on random columns: no error above its bound.
+/// Measures a mapper on random columns, and checks that no error exceeds its bound.
 fn measure(columns: u32, mapper: (&str, Pieces, bool), random: &mut fastrand::Rng) -> Errors {
     let texels = vec![0; 1 << 16];
     let mut errors = Errors::default();
@@ -277,7 +277,7 @@ fn measure(columns: u32, mapper: (&str, Pieces, bool), random: &mut fastrand::Rn
         errors.worst = errors.worst.max(error / 65536.0);
         let [from, to] = bend.ends;
         let change = (to.0 - from.0).abs().max((to.1 - from.1).abs());
-        // Of 1/32 texel, what fixed point may add is no more than a tenth.
+        // Above 1/32 texel, fixed point adds at most a tenth.
         if bound > 2048.0 && bound < 0.7 * f64::from(change) {
             errors.closed = errors.closed.max(share);
             errors.runs += 1;

@@ -1,4 +1,4 @@
-//! Tiled textures against the same rectangle with all of its texels, by every mapper.
+//! Compares tiled textures with the same rectangle stored with all of its texels, for every mapper.
 
 mod faces;
 

@@ -1,4 +1,4 @@
-//! The mappers that keep to an error: they do, and no cheaper way of the table would have.
+//! The mappers that keep to an error: checks that they do, and that no cheaper method of the table would.
 
 mod random;
 
@@ -17,14 +17,14 @@ use texmap::{Face, Mapper, Point, Texture, Tolerance, Vertex, Walk};
 
 const FOCAL_LENGTH: i32 = 258;
 
-/// A face that is seen: its corners in space, and where they are on the screen.
+/// A visible face: its corners in space and on the screen.
 struct Seen {
     polygon: Vec<Vertex>,
     anchors: [Anchor; 3],
 }
 
-/// A quarter of a plane, or half of one, that a rectangle of the texture lies on: small facets,
-/// walls, floors to the horizon, and anything.
+/// A face on a part of a plane, with a rectangle of the texture: small facets, walls, floors to the horizon,
+/// and anything.
 fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
     let kind = random.u8(0..4);
     let (w, h) = (i32::from(size.0) << 16, i32::from(size.1) << 16);
@@ -39,10 +39,10 @@ fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
     let space = |random: &mut fastrand::Rng, reach: f64| {
         [(); 3].map(|()| (random.f64() * 2.0 - 1.0) * reach)
     };
-    // Depths in units of 16.16; the nearest corner decides how much of the screen it is.
+    // Depths in units of 16.16; the nearest corner decides how much of the screen the face covers.
     let near = (16.0 + 4.0 * random.f64()).exp2();
     let (origin, right, down) = match kind {
-        // A facet: small, as it is on a ball.
+        // A facet, small as on a ball.
         0 => {
             let [x, y, _] = space(random, near / 2.0);
             let reach = near * (-2.0 - 4.0 * random.f64()).exp2();
@@ -59,7 +59,7 @@ fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
                 [0.0, 0.0, far.min(1.6e7) - near],
             )
         }
-        // A wall that goes away to the side.
+        // A wall that recedes to the side.
         2 => {
             let far = near * (6.0 * random.f64()).exp2();
             let [x, y, _] = space(random, near / 2.0);
@@ -108,7 +108,7 @@ fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
     })
 }
 
-/// Gives `sink` faces as [`seen`] makes them, until it has had enough.
+/// Passes random faces from [`seen`] to `sink` until it breaks.
 fn faces(
     random: &mut fastrand::Rng,
     mut sink: impl FnMut(&Face<'_>, &plane::Plane, &Texture<'_>) -> ControlFlow<()>,
@@ -133,7 +133,7 @@ fn faces(
     }
 }
 
-/// Gives `sink` columns of such faces, at least so many.
+/// Passes at least `least` columns of such faces to `sink`.
 fn columns(
     least: u32,
     random: &mut fastrand::Rng,
@@ -157,7 +157,7 @@ fn enough(enough: bool) -> ControlFlow<()> {
     }
 }
 
-/// The forms along a run.
+/// The forms along a span.
 fn forms(plane: &plane::Plane, axis: Axis, run: &coverage::Run<()>) -> plane::Walk {
     match axis {
         Axis::Down => plane::Walk::new(plane, axis, run.line, run.first),
@@ -165,7 +165,7 @@ fn forms(plane: &plane::Plane, axis: Axis, run: &coverage::Run<()>) -> plane::Wa
     }
 }
 
-/// The walk of `len` pixels from pixel `first` of another on.
+/// The walk of another walk's pixels from `first` on.
 fn from(walk: &plane::Walk, first: u16) -> plane::Walk {
     plane::Walk {
         at: walk.after(first),
@@ -173,14 +173,14 @@ fn from(walk: &plane::Walk, first: u16) -> plane::Walk {
     }
 }
 
-/// Whether all of a run may be one line, by the closed form.
+/// Whether all of a span may be one line, by the closed form.
 fn keeps(walk: &plane::Walk, len: u16, tolerance: Tolerance, texture: &Texture<'_>) -> bool {
     let first = Pieces::new(walk, len, None, tolerance, texture).next();
     first.is_some_and(|piece| piece.len == len)
 }
 
-/// Checks that no cheaper way would have kept to the error by its own bound, all of them tried, and
-/// counts the pixels of each way: those of an adaptive run's pieces by their lengths.
+/// Checks that no cheaper method would have kept to the error by its own bound, by trying all of them. Counts
+/// the pixels of each method; an adaptive span's pieces count by their lengths.
 fn none_cheaper(
     walk: &plane::Walk,
     (len, row): (u16, Option<u16>),
@@ -191,7 +191,7 @@ fn none_cheaper(
     let keeps = |first: u16, len: u16| keeps(&from(walk, first), len, tolerance, texture);
     assert!(!keeps(0, len), "a line would do");
     let backward = walk.step[2] > 0;
-    // The `steps` from pixel `near` of the run on, away from its near end.
+    // The line of `steps` steps from pixel `near` of the span, away from its near end.
     let line = |near: u16, steps: u16| match backward {
         false => keeps(near, steps + 1),
         true => keeps(near - steps, steps + 1),
@@ -228,7 +228,7 @@ fn none_cheaper(
                 "a line in place of {rest} quotients"
             );
         }
-        // What a quadratic of 32 pixels might have taken three quarters of the time for.
+        // Pixels for which a quadratic of 32 pixels would have needed three quarters of the time.
         let curves = (done..len - 1).step_by(32).filter(|&at| at + 32 < len);
         let first = |at: u16| if backward { len - 1 - at - 32 } else { at };
         let bends = curves.map(|at| Bend::new(&from(walk, first(at)), 33, texture));
@@ -239,8 +239,8 @@ fn none_cheaper(
     }
 }
 
-/// Either way, no pixel of any face is further off than the tolerance, and no way that was taken is
-/// dearer than another.
+/// Checks that, in rows and in columns, no pixel of any face exceeds the tolerance, and that no cheaper
+/// method than the chosen one would do.
 fn within(least: u32, tolerance: &str) {
     let least = seeded::cases(least as usize) as u32;
     let mut random = seeded::generator();
@@ -256,7 +256,7 @@ fn within(least: u32, tolerance: &str) {
                 let forms = forms(plane, axis, &run);
                 let walk = match axis == within.axis() {
                     true => walks(&run),
-                    // As it would be if rows paid, or if columns did.
+                    // As if rows were cheaper, or columns.
                     false => Walk::Adaptive(forms, tolerance),
                 };
                 let (x, y, row) = match axis {
@@ -324,7 +324,7 @@ fn within(least: u32, tolerance: &str) {
         for way in ["a line", "exact", "lines", "long lines"] {
             assert!(ways[k].contains_key(way), "{name}: {way}");
         }
-        // So few that curves are no way of their own.
+        // So few that a separate method for curves does not pay.
         let few = if tolerance.units() >= 1 << 12 { 2 } else { 12 };
         assert!(
             ways[k]["exact, a curve would do"] * 100 <= pixels[k] * few,
@@ -348,7 +348,7 @@ fn a_shorter_piece_would_take_longer_than_quotients() {
     assert!(LENGTHS.iter().all(|length| length % 4 == 0));
 }
 
-/// What an axis takes, by the pieces that its runs are cut into, in pixels of a line.
+/// The cost of an axis, by the pieces into which its spans are cut, in pixels of a line.
 fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>) -> u64 {
     let (plane, piece) = (
         face.plane(),
@@ -371,7 +371,8 @@ fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>
     cost
 }
 
-/// The axis is found from a polygon's corners. How near that comes to what all of its runs say.
+/// The axis is chosen from a polygon's corners. Measures how close that choice comes to the cost of all
+/// spans.
 #[test]
 fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
     let mut random = seeded::generator();
@@ -464,7 +465,7 @@ fn affine(least: u32) {
             face.polygon
         );
         let most = f64::from(size.0.max(size.1)) * 65536.0;
-        // Far above what fixed point adds, and below what any two coordinates differ by.
+        // Far above the error of fixed point, and below the difference of any two coordinates.
         if bound > 8192.0 && bound < 0.7 * most {
             tightest = tightest.max(error / bound);
             sum += error / bound;
@@ -525,15 +526,15 @@ fn a_run_is_inside_its_polygon() {
     });
 }
 
-/// A sliver that faces the eye, with a texture squeezed into it: 320 texels from a pixel to the
-/// next, half as many back from a row to the next. Nothing leans, so only how steep it is speaks
-/// against one map.
+/// A sliver that faces the eye, with a texture squeezed into it: 320 texels from a pixel to the next, and
+/// half as many back from a row to the next. The depth is constant, so only the steepness rules out a single
+/// map.
 #[test]
 fn a_sliver_with_more_texels_a_pixel_than_a_texture_has_keeps_to_its_error() {
     let texture = Texture::new(&[0; 256 * 256], 256, 256).unwrap();
     let corners = [(99, 0, 0), (102, 240, 0), (142, 240, 240), (139, 0, 240)];
     let corners = corners.map(|(x, u, v)| (x, if v == 0 { 100 } else { 180 }, u << 16, v << 16));
-    // In quarters of a pixel, before the middle of the screen.
+    // In quarters of a pixel, relative to the centre of the screen.
     let place = |(x, y, u, v)| Anchor {
         position: [(x - 100) * 1024, (y - 100) * 1024, FOCAL_LENGTH << 12],
         u,

@@ -1,5 +1,5 @@
-//! What the loops keep in registers, how it is made of a walk, and how it steps: the portable
-//! twins.
+//! The registers of the loops: their start values for a walk, and their steps. These are the
+//! portable versions of the loops.
 //!
 //! Sums wrap: the step after the last pixel may lead anywhere.
 
@@ -9,20 +9,23 @@ use crate::Texture;
 use crate::affine::{self, Walk};
 use crate::loops::Loop;
 
-/// What a loop keeps in registers.
+/// The values that a loop keeps in registers.
 pub(super) trait Registers: Sized {
-    /// Their values at the first of `len` pixels, at least one, if the loop is for the texture.
+    /// Returns the values at the first of `len` pixels, at least one, or nothing if the loop does
+    /// not support the texture.
     ///
     /// # Panics
     /// If the walk leaves the texture, unless the loop wraps it around.
     fn new(texture: &Texture<'_>, walk: Walk, len: u16) -> Option<Self>;
 
-    /// The index of the pixel's texel, which the texture has; then it is the next pixel.
+    /// Returns the index of the current pixel's texel, which the texture has, and steps to the next
+    /// pixel.
     fn next(&mut self) -> usize;
 }
 
-/// The registers at the first pixel of a column, if it is one for the loop: an empty one is done
-/// with, and in a texture that the loop is not for the clear twin draws it.
+/// Returns the registers at the first pixel of a column, if the loop has to draw it. An empty
+/// column needs no drawing. If the loop does not support the texture, the reference implementation
+/// draws the column here.
 #[inline(always)]
 pub(super) fn start<'c, R: Registers>(
     texture: &Texture<'_>,
@@ -41,7 +44,8 @@ pub(super) fn start<'c, R: Registers>(
     }
 }
 
-/// By itself, and the walk not lent: the registers are made without it being in memory.
+/// A separate function that gets the walk by value: otherwise the walk would be stored to memory
+/// before the registers are made.
 #[inline(never)]
 fn unpadded(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     affine::column(texture, walk, column);
@@ -55,7 +59,7 @@ pub(super) fn column<R: Registers>(texture: &Texture<'_>, walk: &Walk, column: C
     }
 }
 
-/// Draws a column by the clear twin.
+/// Draws a column with the reference implementation.
 pub(super) fn multiply(texture: &Texture<'_>, walk: &Walk, column: Column<'_>) {
     affine::column(texture, *walk, column);
 }
@@ -68,11 +72,11 @@ struct Inside {
 }
 
 impl Inside {
-    /// `walk` over `len` pixels, at least one; none in a tiled texture, where an index does not go
-    /// on as the walk does.
+    /// Returns `walk` over `len` pixels, at least one. Returns nothing in a tiled texture, where
+    /// the index does not advance as the walk does.
     ///
     /// # Panics
-    /// If it leaves the texture.
+    /// If the walk leaves the texture.
     #[inline]
     fn new(texture: &Texture<'_>, walk: Walk, len: u16) -> Option<Self> {
         if texture.tile().is_some() {
@@ -80,7 +84,7 @@ impl Inside {
         }
         let steps = i64::from(len) - 1;
         let inside = |from: i32, step: i32, last: i32| {
-            // Without a sign, what is below zero is above all that is inside.
+            // As an unsigned number, a negative coordinate is above every coordinate inside.
             let to = i64::from(from) + steps * i64::from(step);
             from as u32 <= last as u32 && to as u64 <= last as u64
         };
@@ -92,15 +96,16 @@ impl Inside {
         Some(Self { pitch, walk })
     }
 
-    /// The first pixel's texel. Both coordinates are at least zero.
+    /// Returns the index of the first pixel's texel. Both coordinates are at least zero.
     #[inline]
     fn index(&self) -> usize {
         let [row, column] = [self.walk.v, self.walk.u].map(|at| (at as u32 >> 16) as usize);
         row * usize::from(self.pitch) + column
     }
 
-    /// What every step adds to the index, carries apart. Rounded down: the fractions are positive
-    /// also where a step is negative, and every carry is one more.
+    /// Returns what every step adds to the index, apart from the carries. The whole parts are
+    /// rounded down, so the fractions are positive even for a negative step, and every carry adds
+    /// one.
     #[inline]
     fn whole_step(&self) -> isize {
         let Walk { du, dv, .. } = self.walk;
@@ -113,7 +118,7 @@ fn outside() -> ! {
     panic!("the walk leaves the texture")
 }
 
-/// The texel's index and the two fractions of the coordinates, 16 bits at the top of 32.
+/// The texel's index, and the fractions of both coordinates, 16 bits at the top of 32.
 pub(super) struct Address {
     pub at: usize,
     pub u: u32,
@@ -152,19 +157,19 @@ impl Registers for Address {
     }
 }
 
-/// The texel's index, and both fractions in one register: 16 bits of u at the top, 15 of v at the
-/// bottom, and between them a bit that takes the carry of v and is cleared every time.
+/// The texel's index, and both fractions in one register: 16 bits of u at the top, 15 bits of v at
+/// the bottom, and between them a bit that receives the carry of v and is cleared at every step.
 pub(super) struct Halves {
     pub at: usize,
     pub fractions: u32,
     pub step_fractions: u32,
-    /// What every step adds to the index; a carry of u adds 1, one of v `pitch`.
+    /// What every step adds to the index. A carry of u adds 1, and a carry of v adds `pitch`.
     pub step: isize,
     pub pitch: isize,
 }
 
 impl Halves {
-    /// Where v takes its carry.
+    /// The bit that receives the carry of v.
     pub const CARRY: u32 = 1 << 15;
 }
 
@@ -194,9 +199,9 @@ impl Registers for Halves {
     }
 }
 
-/// The coordinates with the bits of the index at 16 and above: `u_mask` has those of the column,
-/// `v_mask` those of the row. Padded textures: the masks together have bits for as many texels as
-/// there are.
+/// The coordinates, with the bits of the index at bit 16 and above: `u_mask` selects the column's
+/// bits and `v_mask` the row's. Padded textures: the two masks together address exactly the
+/// texture's texels.
 pub(super) struct Pair {
     pub u: u32,
     pub v: u32,
@@ -211,7 +216,8 @@ impl Registers for Pair {
     fn new(texture: &Texture<'_>, walk: Walk, _: u16) -> Option<Self> {
         let masks = texture.masks()?;
         let pitch = u32::from(texture.pitch());
-        // At most 8 bits each: v loses none of the 16 of its fraction and the 8 above.
+        // Rows and columns have at most 8 bits each, so v keeps the 16 bits of its fraction and the
+        // 8 above.
         Some(Self {
             u: walk.u as u32,
             v: (walk.v as u32).wrapping_mul(pitch),
@@ -231,13 +237,13 @@ impl Registers for Pair {
 }
 
 /// Both coordinates in one register, and a mask of the index's bits in it. Padded textures: the
-/// mask has bits for as many texels as there are.
+/// mask addresses exactly the texture's texels.
 ///
-/// u lies at the bottom, and only the bits of it that are inside the padded texture: 16 of fraction
-/// and at most 8. A negative step is taken as the positive one that leads to the same column around
-/// the texture, so that nothing is ever borrowed. What u carries beyond its bits goes into the
-/// 16 free ones above it: a column of 65 535 pixels does not fill them. v lies above those, and
-/// what it carries leaves the register, or goes unmasked.
+/// u lies at the bottom, with only the bits that are inside the padded texture: 16 of fraction and
+/// at most 8 above. A negative step is replaced by the positive step that leads to the same column
+/// around the texture, so nothing is ever borrowed. Carries of u beyond its bits go into the 16
+/// free bits above, which a column of 65 535 pixels does not fill. v lies above the free bits, and
+/// its carries leave the register or are masked out.
 pub(super) struct Joint {
     pub at: u64,
     pub step: u64,
@@ -261,22 +267,23 @@ impl Registers for Joint {
     fn next(&mut self) -> usize {
         let index = self.at & self.mask;
         self.at = self.at.wrapping_add(self.step);
-        // The row's bits are 32 above where they go on from the column's.
+        // The row's bits are 32 above the place where they continue the column's.
         ((index >> 32 | index) as u32 >> 16) as usize
     }
 }
 
-/// Two registers, each with the other's fraction: (fraction of u, row) and (fraction of v, column),
-/// 32 bits each. What carries out of the one is what the other's whole texels lack.
+/// Two registers, each with the other coordinate's fraction: (fraction of u, row) and (fraction of
+/// v, column), 32 bits each. The carry out of one register is what the other's whole texels lack.
 ///
-/// Of the two sums in a step the second's carry comes too late for the first, and waits for the
-/// next step. So v's fraction starts a step ahead, and the carry of that first step is kept.
+/// A step has two sums, and the carry of the second comes too late for the first: it waits for the
+/// next step. So v's fraction starts one step ahead, and the carry of that first step is kept.
 ///
-/// A step's whole texels may be negative, and are added as one number with the fraction. In a walk
-/// inside its texture the sum's are not, so the fraction gets back exactly what it lent. But
-/// the *carry* is right only while the step as a whole is not negative, which it would be with
-/// a fraction of zero. Therefore each step's fraction is one part in 2^32 more than it ought to be.
-/// The 16 bits of the fraction don't notice within 65 535 pixels.
+/// A step's whole texels may be negative, and are added together with the fraction as a single
+/// number. In a walk inside its texture the whole texels of the sum are not negative, so the
+/// fraction gets back exactly what it lent. But the *carry* is right only while the step as a
+/// number is not negative, which it would be with negative whole texels and a fraction of zero.
+/// Therefore each step's fraction is too large by one part in 2^32. That does not reach the
+/// fraction's 16 bits within 65 535 pixels.
 pub(super) struct Crossed {
     /// Bits of a column's number.
     pub columns: u32,
@@ -284,7 +291,7 @@ pub(super) struct Crossed {
     pub column: u64,
     pub row_step: u64,
     pub column_step: u64,
-    /// Of v's fraction.
+    /// Pending carry of v's fraction.
     pub carry: bool,
 }
 

@@ -1,13 +1,14 @@
-//! The loops in x86-64 instructions. Why they may read without a check is told in [`super`].
+//! The loops in x86-64 instructions. [`super`] explains why they may read without a check.
 //!
-//! One frame serves all: blocks of [`BLOCK`] pixels, each store at a constant offset (chapter 58).
-//! The first is entered where as many are left as do not fill blocks. One loop so draws any height,
-//! a column of one pixel included, with one jump that is hard to foresee. Nothing between pixels
-//! changes the carry flag (LEA steps the address, DEC counts): a loop may keep it. The loops that
-//! are the fastest have a second frame, for pieces of columns that come in eights.
+//! All loops share a frame of code: blocks of [`BLOCK`] pixels, where each store has a constant
+//! offset (chapter 58). The frame enters the first block in the middle, so that the pixels left
+//! fill whole blocks. So one loop draws any height, a column of one pixel included, with a single
+//! jump that is hard to predict. Nothing between pixels changes the carry flag (LEA steps the
+//! address, DEC counts), so a loop may keep a carry in it. The fastest loops have a second frame,
+//! for pieces of columns whose pixels come in eights.
 //!
-//! Every function gets its registers' first values in a type of [`super::steps`], which was made
-//! of a walk that stays in the texture, or has masks that do.
+//! Every function gets the first values of its registers in a type of [`super::steps`]. That type
+//! was made from a walk that stays in the texture, or has masks that do.
 
 #![allow(unsafe_code)]
 
@@ -26,9 +27,9 @@ use crate::places::Part;
 const BLOCK: usize = 32;
 const _: () = assert!(STRIDE == 80, "the offsets in `down` are multiples of 80");
 
-/// The frame, for a column that is not empty. `$first` prepares the flags; `$pixel!(offset)` is one
-/// pixel and its step: it stores to `{dest}` + offset, has `{texel}` and `{spare}` to itself, and
-/// uses what the operands after it name.
+/// The frame, for a column that is not empty. `$first` prepares the flags. `$pixel!(offset)` is one
+/// pixel and its step: it stores to `{dest}` + offset, may use `{texel}` and `{spare}` freely, and
+/// uses the operands that follow it.
 macro_rules! down {
     ($column:ident, $first:literal, $pixel:ident, $($operands:tt)*) => {
         down!(
@@ -48,12 +49,12 @@ macro_rules! down {
         $($label:literal $offset:literal),*,
     ) => {{
         let len = usize::from($column.len());
-        // So many pixels of the first block are left out, as if the column began above its top.
+        // The number of the first block's pixels to skip, as if the column began above its top.
         let left_out = len.wrapping_neg() % BLOCK;
         let dest = $column.as_ptr().wrapping_sub(left_out * STRIDE);
         // SAFETY: the frame stores to the first byte of the column and to every 80th after it, as
-        // many as it has pixels: what `Lane::new` was promised. What `$pixel` reads are texels,
-        // by its caller's argument. The stack is not used.
+        // many bytes as the column has pixels: exactly what `Lane::new` was promised. `$pixel`
+        // reads texels only, by its caller's argument. The stack is not used.
         unsafe {
             asm!(
                 "lea {spare}, [rip + 8f]",
@@ -81,15 +82,15 @@ macro_rules! down {
     }};
 }
 
-/// The frame for the whole eights of a column that has one: no entry is looked for, and what
-/// follows them is not drawn.
+/// The frame for the whole eights of a column. It has no entry in the middle, and does not draw the
+/// pixels after the last whole eight.
 macro_rules! eights {
     ($column:ident, "", $pixel:ident, $($operands:tt)*) => {{
         let blocks = u32::from($column.len() / 8);
         if blocks == 0 {
             return;
         }
-        // SAFETY: as in `down`, but for the pixels that are left over.
+        // SAFETY: as in `down`; the pixels after the last whole eight are not stored.
         unsafe {
             asm!(
                 ".p2align 4",
@@ -115,7 +116,7 @@ macro_rules! eights {
     }};
 }
 
-/// The address and two fractions, each carry tested.
+/// An address and two fractions, with a test of each carry.
 #[inline(always)]
 pub(super) fn two_carries(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
@@ -154,8 +155,8 @@ pub(super) fn two_carries(texture: &Texture<'_>, walk: Walk, column: Column<'_>)
     );
 }
 
-/// Both fractions in one register: the carry of the upper goes out of it into the address, the
-/// lower's into a bit that is tested.
+/// Both fractions in one register. The upper fraction's carry leaves the register and is added to
+/// the address; the lower's goes to a bit that is tested.
 #[inline(always)]
 pub(super) fn packed(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
@@ -191,7 +192,7 @@ pub(super) fn packed(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     );
 }
 
-/// SBB makes 0 or -1 of v's carry, which picks the step; u's carry goes in with it.
+/// SBB turns v's carry into 0 or -1, which selects the step; u's carry is added along with it.
 #[inline(always)]
 pub(super) fn two_steps(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
@@ -213,7 +214,7 @@ pub(super) fn two_steps(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     };
     let texels = texture.texels().as_ptr();
     let at = texels.wrapping_add(start.at);
-    // By themselves: all of `start` would be in memory.
+    // A copy: with a pointer into `start`, all of `start` would be in memory.
     let steps = start.steps;
     down!(column, "", pixel,
         at = inout(reg) at => _,
@@ -267,13 +268,13 @@ pub(super) fn shifts(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     shifts!(down, texture, walk, column,);
 }
 
-/// [`shifts`] for whole eights.
+/// Draws the whole eights of a column as [`shifts`] does.
 #[inline(always)]
 pub(super) fn shifts_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     shifts!(eights, texture, walk, column, spare = out(reg) _,);
 }
 
-/// One accumulator and one mask, the row's bits shifted down to the column's.
+/// One accumulator and one mask, with the row's bits shifted down to the column's.
 #[inline(always)]
 pub(super) fn joined(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     macro_rules! pixel {
@@ -305,8 +306,8 @@ pub(super) fn joined(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     );
 }
 
-/// The two registers cross their carries. How the row is scaled depends on the pitch, because no
-/// shift leaves the flags alone: by the scale of addresses, or by moving a byte.
+/// The two registers exchange their carries. Every shift changes the flags, so the row is scaled by
+/// the scale of an address or by moving a byte, depending on the pitch.
 #[inline(always)]
 pub(super) fn add_carry(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     let Some((start, mut column)) = start::<Crossed>(texture, walk, column) else {
@@ -380,7 +381,8 @@ pub(super) fn add_carry(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     }
 }
 
-/// One accumulator, and an instruction that gathers the bits of the index. The CPU must have it.
+/// One accumulator, and an instruction that gathers the bits of the index. The CPU must have this
+/// instruction.
 macro_rules! extract {
     ($frame:ident, $texture:ident, $walk:ident, $column:ident) => {
         macro_rules! pixel {
@@ -412,33 +414,33 @@ pub(super) fn extract(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     extract!(down, texture, walk, column);
 }
 
-/// [`extract`] for whole eights.
+/// Draws the whole eights of a column as [`extract`] does.
 #[inline(always)]
 pub(super) fn extract_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
     extract!(eights, texture, walk, column);
 }
 
-/// [`extract`] along a row. The CPU must have it.
+/// Writes the texels of a row as [`extract`] does. The CPU must have BMI2.
 #[inline(always)]
 pub(super) fn along(texels: &[u8], joint: Joint, places: impl Part) {
-    /// Compiled for such a CPU, and with it the loop that `places` is filled by.
+    /// Compiled for a CPU with BMI2, together with the loop that fills `places`.
     #[target_feature(enable = "bmi2")]
     fn extract(texels: &[u8], joint: Joint, places: impl Part) {
         let Joint { mut at, step, mask } = joint;
         places.fill(|| {
             let index = _pext_u64(at, mask) as usize;
             at = at.wrapping_add(step);
-            // SAFETY: the mask has bits for as many texels as there are.
+            // SAFETY: the mask addresses exactly the texture's texels, so the index is in bounds.
             unsafe { *texels.get_unchecked(index) }
         });
     }
     debug_assert!(has_extract());
-    // SAFETY: the CPU has BMI2, by the caller's word.
+    // SAFETY: the caller guarantees that the CPU has BMI2.
     unsafe { extract(texels, joint, places) }
 }
 
-/// Whether the CPU has BMI2, and with it PEXT. Asked once: CPUID is slow, under a hypervisor most
-/// of all.
+/// Returns whether the CPU has BMI2, and with it PEXT. Keeps the answer: CPUID is slow, above all
+/// under a hypervisor.
 #[inline]
 pub(super) fn has_extract() -> bool {
     const UNKNOWN: u8 = 0;

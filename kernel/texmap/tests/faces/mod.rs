@@ -1,4 +1,4 @@
-//! Faces to map, and whether what is drawn of them is what the jobs say.
+//! Faces to map, and checks that they are drawn as their jobs say.
 
 use modex::{Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Tally};
 use texmap::coverage::{self, Axis};
@@ -9,13 +9,13 @@ use vga::Vga;
 pub const FOCAL_LENGTH: i32 = 258;
 const BACKGROUND: [u8; HEIGHT] = [0; HEIGHT];
 
-/// Texels of a padded texture, none of them the background's colour.
+/// Texels of a padded texture; none has the background's colour.
 pub fn texels(width: u16, height: u16) -> Vec<u8> {
     let len = Texture::padded_len(width, height);
     (0..len).map(|i| (i * 31 % 251) as u8 | 1).collect()
 }
 
-/// A convex or odd polygon anywhere near the screen, its coordinates inside the texture.
+/// A convex or irregular polygon anywhere near the screen, with coordinates inside the texture.
 pub fn polygon(random: &mut fastrand::Rng, sides: usize, (w, h): (u16, u16)) -> Vec<Vertex> {
     let spread = [4, 40, 400][random.usize(..3)] * 256;
     let snap = [1, 128, 256][random.usize(..3)];
@@ -30,7 +30,7 @@ pub fn polygon(random: &mut fastrand::Rng, sides: usize, (w, h): (u16, u16)) -> 
         .collect()
 }
 
-/// Any three points: before the eye, behind it, across it; sometimes degenerate.
+/// Any three points: in front of the eye, behind it, across it; sometimes degenerate.
 pub fn anchors(random: &mut fastrand::Rng, (w, h): (u16, u16)) -> [Anchor; 3] {
     let most = 1 << random.u32(4..=24);
     let mut anchors = [(); 3].map(|()| Anchor {
@@ -57,7 +57,8 @@ pub fn jobs(mapper: Mapper, face: &Face<'_>, texture: &Texture<'_>) -> Vec<Job> 
     jobs
 }
 
-/// Every pixel of coverage is in one job, no other is in any, and all texels are the texture's.
+/// Checks that every covered pixel is in exactly one job, that jobs have no other pixels, and that all texels
+/// are inside the texture.
 pub fn check_pixels(mapper: Mapper, face: &Face<'_>, texture: &Texture<'_>) -> usize {
     let mut inside = vec![0u8; 320 * 240];
     coverage::runs(Axis::Down, face.polygon, |run| {
@@ -85,8 +86,8 @@ pub fn check_pixels(mapper: Mapper, face: &Face<'_>, texture: &Texture<'_>) -> u
     covered
 }
 
-/// Draws a face in both orders, in RAM and on the emulated card: each page is the one that the
-/// jobs' own pixels make. What was written for each order.
+/// Draws a face in two orders, in RAM and on the emulated VGA, and checks that each page equals the pixels of
+/// the jobs. Returns the counts of each order.
 pub fn check_drawing(
     mapper: Mapper,
     face: &Face<'_>,
@@ -99,7 +100,7 @@ pub fn check_drawing(
         });
     }
     let textures = [*texture];
-    // A list that is often full.
+    // A short list, which is often full.
     let mut list = JobList::<50>::new();
     let face = Face {
         texture: 0,

@@ -1,16 +1,16 @@
-//! Random columns of a texture's plane, and what their pixels should be.
+//! Random columns of a texture's plane, and the expected coordinates of their pixels.
 
-// Each test takes what it needs.
+// Each test uses only a part of this module.
 #![allow(dead_code)]
 
 use texmap::plane::Walk;
 
-/// Columns that every default test of an error looks at, for each mapper.
+/// Columns that each default test of an error checks, for each mapper.
 pub const COLUMNS: u32 = 100_000;
-/// Those of the deep ones.
+/// Columns that each deep test checks.
 pub const DEEP_COLUMNS: u32 = 1_000_000;
 
-/// A side of a texture: powers of two and not, 1, the largest.
+/// A side of a texture: powers of two and other numbers, 1, the largest.
 pub fn side(random: &mut fastrand::Rng) -> u16 {
     match random.u8(0..4) {
         0 => random.u16(1..=4),
@@ -19,7 +19,8 @@ pub fn side(random: &mut fastrand::Rng) -> u16 {
     }
 }
 
-/// A depth ratio from 1 to 4096, any power of two between 2^-20 above 1 and that.
+/// A depth ratio: 1, or above 1 by 2^-20 to 1, or from 1 to 4096. Within each range every magnitude is
+/// equally likely.
 fn ratio(random: &mut fastrand::Rng) -> f64 {
     match random.u8(0..4) {
         0 => 1.0,
@@ -28,7 +29,7 @@ fn ratio(random: &mut fastrand::Rng) -> f64 {
     }
 }
 
-/// A coordinate at an end: in the texture.
+/// A coordinate at an end, inside the texture.
 fn end(random: &mut fastrand::Rng, size: u16) -> f64 {
     match random.u8(0..8) {
         0 => 0.0,
@@ -37,8 +38,7 @@ fn end(random: &mut fastrand::Rng, size: u16) -> f64 {
     }
 }
 
-/// A run of a face that is seen: c is above zero, and the coordinates are inside the texture, but for
-/// rounding.
+/// A span of a visible face: c is above zero, and the coordinates are inside the texture, but for rounding.
 pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> Walk {
     let ratio = ratio(random);
     let near = (20.0 + 33.0 * random.f64()).exp2() * ratio.max(1.0);
@@ -59,14 +59,14 @@ pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> Walk {
         };
         forms[k] = [0, 1].map(|i| ([from, to][i] * forms[2][i] as f64) as i64);
     }
-    // What the steps are cut by may leave the texture by a little.
+    // The rounding of the steps may leave the texture by a little.
     Walk {
         at: forms.map(|[from, _]| from),
         step: forms.map(|[from, to]| (to - from) / steps),
     }
 }
 
-/// Any run: outside the texture, across the horizon and behind it, and c = 0 at one of its pixels.
+/// Any span: outside the texture, across the horizon and behind it, and with c = 0 at a pixel.
 pub fn any(random: &mut fastrand::Rng, len: u16) -> Walk {
     let value = |random: &mut fastrand::Rng, bits: u32| {
         let limit = 1i64 << random.u32(0..=bits);
@@ -88,8 +88,8 @@ pub fn any(random: &mut fastrand::Rng, len: u16) -> Walk {
     walk
 }
 
-/// The quotient n / c in units of 2^-16 texel, clamped into a texture of `size` texels; on and beyond
-/// the horizon what it comes to before.
+/// The quotient n / c in units of 2^-16 texel, clamped to a texture of `size` texels. On the horizon and
+/// beyond it, the value that the quotient tends to before the horizon.
 pub fn truth(n: i64, c: i64, size: u16) -> f64 {
     let last = f64::from(size) * 65536.0 - 1.0;
     match (n < 0, c > 0) {
@@ -99,7 +99,7 @@ pub fn truth(n: i64, c: i64, size: u16) -> f64 {
     }
 }
 
-/// How far coordinates are from the truth at pixel `i` of a walk, the worse of the two.
+/// The error of the coordinates at pixel `i` of a walk: the larger of the two.
 pub fn off(walk: &Walk, i: u16, (u, v): (i32, i32), size: (u16, u16)) -> f64 {
     let [a, b, c] = walk.after(i);
     let off = |n: i64, at: i32, size: u16| (truth(n, c, size) - f64::from(at)).abs();
