@@ -1,7 +1,7 @@
-//! The release image in real QEMU, without a window.
+//! Boots the release image in real QEMU, without a window.
 //!
-//! Each test boots a machine of its own, so that one failure leaves the others alone; set-up is
-//! one locked step that all of them take.
+//! Each test boots a separate machine, so that a failure does not affect the other tests. Set-up is a single
+//! locked step that all tests share.
 
 use std::fs::File;
 use std::io::{BufReader, Write};
@@ -35,7 +35,7 @@ fn boot_with(arguments: &[&str], limits: Limits) -> Machine {
     Machine::boot(&config).expect("boots")
 }
 
-/// Limits under which a test sees a hang soon. The boot keeps its own.
+/// Short limits, so that a test detects a hang soon. The boot keeps its own limit.
 fn short() -> Limits {
     Limits {
         answer: Duration::from_secs(1),
@@ -58,9 +58,9 @@ fn the_registers_read_back_as_the_table_says() {
         match block {
             // The last column's plane.
             "sequencer" => assert!([1, 2, 4, 8].contains(&std::mem::replace(&mut read[2], 0x0F))),
-            // Page 1: the start address is what a flip changes.
+            // Page 1: a flip changes the start address.
             "crtc" => assert_eq!(std::mem::replace(&mut read[0x0C], 0), 0x4B),
-            // QEMU has none.
+            // QEMU has no PEL Mask.
             "pel-mask" => continue,
             _ => {}
         }
@@ -70,7 +70,7 @@ fn the_registers_read_back_as_the_table_says() {
     machine.leave().unwrap();
 }
 
-/// Frames shown, frames late, and ticks of the running show; nothing if it is held.
+/// Returns the frames shown, late frames and ticks of the running demo, or `None` if the demo is held.
 fn pace(machine: &mut Machine) -> Option<[u32; 3]> {
     let counts = machine.ask(Command::Counts).unwrap();
     let pace = counts.iter().find(|line| line.starts_with("pace "))?;
@@ -78,8 +78,8 @@ fn pace(machine: &mut Machine) -> Option<[u32; 3]> {
     Some([words[2], words[4], words[6]].map(|number| number.parse().unwrap()))
 }
 
-/// The time of a machine under `-icount` is the number of its instructions, so a busy host takes nothing
-/// of it away: every tick has its frame.
+/// Under `-icount` the machine's time is its number of instructions, so a busy host cannot slow it down:
+/// every tick has its frame.
 #[test]
 fn each_tick_has_its_frame() {
     let mut machine = boot_with(&["-icount", "shift=2"], Limits::default());
@@ -104,8 +104,9 @@ fn each_tick_has_its_frame() {
 fn the_running_show_paces_itself_and_can_be_held() {
     let mut machine = boot();
     machine.wait_until_running().unwrap();
-    // A busy host takes the machine's time away, so that ticks are lost; it never adds any. So of some seconds
-    // one must have nearly all of its sixty ticks, unless QEMU had to wait for a processor in each of them.
+    // A busy host deprives the machine of time, so that ticks are lost; it never adds any. So among some
+    // seconds at least one must have nearly all of its sixty ticks, unless QEMU had to wait for a processor
+    // in each of them.
     let mut undisturbed = 0;
     let paced = (0..20).any(|_| {
         let (since, starved) = (Instant::now(), machine.starved_time());
@@ -138,13 +139,13 @@ fn the_running_show_paces_itself_and_can_be_held() {
     machine.leave().unwrap();
 }
 
-/// By keys at the keyboard and by commands; what is shown then is drawn again from the log, held, and
-/// on the emulated card.
+/// Steers with keys and with commands. The log must then reproduce the frame on the screen, held, and on the
+/// emulated VGA too.
 #[test]
 fn a_steered_show_is_brought_back_by_its_log() {
     let mut machine = boot();
     machine.wait_until_running().unwrap();
-    // Held down, as QEMU's window sends repeats; more codes than the machine has room for.
+    // Keys held down, since QEMU's window sends repeats; more codes than the machine has room for.
     for _ in 0..100 {
         machine.key("left", true).unwrap();
         machine.key("m", true).unwrap();
@@ -153,8 +154,8 @@ fn a_steered_show_is_brought_back_by_its_log() {
         machine.key(key, true).unwrap();
         machine.key(key, false).unwrap();
     }
-    // QEMU hands on keys when it comes to it, and drops what its buffer has no room for: the scene
-    // is not to change between two of them.
+    // QEMU passes keys on with a delay, and drops those that do not fit its buffer. The scene must not change
+    // between two of them.
     let mut log = Vec::new();
     while !log.iter().any(|line: &String| line.ends_with(" nearer")) {
         machine.key("pgup", true).unwrap();
@@ -174,7 +175,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
     println!("{log:#?}");
     let pushed = |name| log.iter().filter(|line| line.ends_with(name)).count();
     assert_eq!((pushed(" next-mapper"), pushed(" next-scene")), (1, 1));
-    // As many as the scene takes; the scene after it counts from zero, and on a busy machine some of
+    // At most as many as the scene accepts. The next scene counts from zero, and on a busy machine some of
     // the codes arrive after the change of scene.
     let first = log.iter().take_while(|line| !line.ends_with(" next-scene"));
     let first = first.filter(|line| line.ends_with(" yaw-left")).count();
@@ -188,7 +189,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
         .unwrap()
         .parse()
         .unwrap();
-    // The picture of that tick is on the screen.
+    // The frame of that tick is on the screen.
     machine.rest(Duration::from_millis(100)).unwrap();
     let shown = machine.dump(Content::Page).unwrap();
     let screen = machine.screen().unwrap();
@@ -222,7 +223,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
     machine.leave().unwrap();
 }
 
-/// Asks the kernel to break, and returns how that was judged.
+/// Makes the kernel fail, and returns the verdict.
 fn failure(fault: Fault) -> Judged {
     failure_within(Limits::default(), fault)
 }
@@ -251,7 +252,7 @@ fn a_panic_is_told_with_its_place() {
     assert_eq!(report[1], "asked to, by 'fail panic'");
 }
 
-/// The line is locked and half written: the report goes past both.
+/// The line is locked and half written; the report must pass both.
 #[test]
 fn a_panic_in_the_middle_of_a_line_is_told_whole() {
     let judged = failure(Fault::PanicInLine);
@@ -261,7 +262,7 @@ fn a_panic_in_the_middle_of_a_line_is_told_whole() {
     assert_eq!(report[1], "asked to, by 'fail panic-in-line'");
 }
 
-/// The kernel ends while more was asked: its last words are still read.
+/// The kernel ends while commands are pending: its last message must still be read.
 #[test]
 fn a_panic_with_commands_under_way_is_told_whole() {
     let mut machine = boot();
@@ -347,7 +348,7 @@ fn a_hang_is_noticed() {
     assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }
 
-/// What is sent fills the buffers, and then nobody takes it.
+/// The data fills the buffers, and then nobody reads them.
 #[test]
 fn a_kernel_that_does_not_read_hangs() {
     let mut machine = boot_with(&[], short());
@@ -357,7 +358,7 @@ fn a_kernel_that_does_not_read_hangs() {
     assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }
 
-/// A machine, and QEMU's monitor, by which the test does what a user does at the window.
+/// A machine, and QEMU's monitor, through which the test acts as a user at the window.
 fn boot_with_monitor(limits: Limits) -> (Machine, UnixStream) {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("monitor");
@@ -366,8 +367,8 @@ fn boot_with_monitor(limits: Limits) -> (Machine, UnixStream) {
     (machine, UnixStream::connect(&socket).unwrap())
 }
 
-/// GTK's window quits when it is closed, and its menu has the others. `-no-reboot -no-shutdown`
-/// makes a reset a machine that stands still, and the kernel does not hear of a power button.
+/// Closing GTK's window quits QEMU, and its menu has the other two. `-no-reboot -no-shutdown` turns a reset
+/// into a machine that stands still, and the kernel does not notice a power button.
 #[test]
 fn a_machine_ended_at_the_window_is_the_users_doing() {
     for command in ["quit\n", "system_reset\n", "system_powerdown\n"] {
@@ -382,7 +383,7 @@ fn a_paused_machine_does_not_hang() {
     let (mut machine, mut monitor) = boot_with_monitor(short());
     monitor.write_all(b"stop\n").unwrap();
     machine.rest(Duration::from_secs(1)).unwrap();
-    // Longer than an answer may take.
+    // Longer than the limit for an answer.
     let resume = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_secs(4));
         monitor.write_all(b"cont\n").unwrap();
@@ -449,7 +450,7 @@ fn a_stop_in_the_boot_loader_names_what_was_found() {
             assert!(said.contains(word), "{vga} {arguments}: {said}");
         }
     };
-    // Side by side, because most of the time passes waiting.
+    // In parallel, because most of the time passes waiting.
     std::thread::scope(|scope| {
         for case in cases {
             scope.spawn(move || check(case));
@@ -462,7 +463,7 @@ fn arguments_of_the_user_stand_beside_ours() {
     let folder = tempfile::tempdir().unwrap();
     let disk = folder.path().join("empty.img");
     std::fs::write(&disk, vec![0; 1 << 20]).unwrap();
-    // A second disk does not boot first, and two accelerators would be an error.
+    // A second disk must not boot first, and two accelerators would be an error.
     let arguments = ["-M", "q35,accel=tcg", "-hda", disk.to_str().unwrap()];
     let machine = boot_with(&arguments, Limits::default());
     machine.leave().unwrap();
@@ -537,7 +538,7 @@ fn send_signal(signal: Signal, process: u32) {
     kill_process(process, signal).unwrap();
 }
 
-/// Runs the host program itself.
+/// Runs the host program.
 fn crystal_ball(arguments: &[&str]) -> Output {
     let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
     program
@@ -578,7 +579,7 @@ fn without_a_display_a_picture_is_left_and_so_by_a_second_one_beside_it() {
             (info.width, info.height, info.line_size),
             (640, 480, 3 * 640)
         );
-        // It is the picture of some tick of the first minute, from edge to edge.
+        // The screen shows the frame of a tick in the first minute, from edge to edge.
         let mut memory = card::memory();
         let mut emulated = Emulated::new(&mut memory).unwrap();
         emulated.ask(Command::Hold).unwrap();
@@ -633,11 +634,11 @@ fn whatever_ends_the_program_ends_qemu() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let pidfile = folder.path().join("pid");
-        // Its path is longer than a socket's may be.
+        // The path is longer than a socket's path may be.
         let temporary = folder.path().join("t".repeat(120));
         std::fs::create_dir(&temporary).unwrap();
         let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
-        // A machine that never reaches the kernel: the program waits for it.
+        // This machine never reaches the kernel, so the program waits for it.
         program
             .args(["--headless", "--vga", "none", "--", "-pidfile"])
             .arg(&pidfile)
@@ -657,7 +658,7 @@ fn whatever_ends_the_program_ends_qemu() {
     }
 }
 
-/// Asks again and again, for a minute at most.
+/// Calls `ask` until it returns an answer, for at most a minute.
 fn wait_for<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
     let by = Instant::now() + Duration::from_secs(60);
     loop {
@@ -670,12 +671,13 @@ fn wait_for<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
 }
 
 /// The loader calls the BIOS for every cluster, so the boot time grows with the number of clusters. The
-/// program's 2 MiB of memory are zeros, which take no room in the image as long as all of them are.
+/// program's 2 MiB of memory are zeros, which need no room in the image as long as all of them are zero.
 #[test]
 fn the_image_is_small_and_has_large_clusters() {
     let image = std::fs::read(&READY.image).unwrap();
     assert!(image.len() < 2 << 20, "{} bytes", image.len());
-    // The second entry of the partition table is the boot partition, and 8 bytes into it is its sector.
+    // The second entry of the partition table is the boot partition; its first sector is at byte 8 of the
+    // entry.
     let start = &image[446 + 16 + 8..][..4];
     let start = u32::from_le_bytes(start.try_into().unwrap()) as usize * 512;
     let sectors_per_cluster = image[start + 13];

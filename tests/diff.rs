@@ -1,4 +1,4 @@
-//! `diff` from the outside: what the program says, where, and by which exit code.
+//! `diff` from the outside: the program's messages, where they go, and its exit codes.
 
 use std::fs;
 use std::io::Cursor;
@@ -24,7 +24,7 @@ impl World {
         self.0.path().join(name)
     }
 
-    /// Writes a file, and the folder that it is in.
+    /// Writes a file, and creates its folder.
     fn put(&self, name: &str, bytes: impl AsRef<[u8]>) {
         let path = self.path(name);
         fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -51,7 +51,7 @@ impl World {
     }
 }
 
-/// What the program said.
+/// The program's exit code and output.
 #[derive(Debug, PartialEq, Eq)]
 struct Said {
     code: Option<i32>,
@@ -121,7 +121,7 @@ fn one_pixel(dump: &mut Dump) {
 fn equal_files_are_equal() {
     let world = World::new();
     world.put("a.dump", page(|_| {}));
-    // As a terminal leaves it.
+    // With the line ends of a terminal.
     let text = String::from_utf8(page(|_| {})).unwrap();
     world.put("b.dump", text.replace('\n', "\r\n"));
     world.put("a.png", png(|_| {}));
@@ -186,7 +186,7 @@ fn folders_are_matched_by_name_and_all_of_it_is_told() {
     world.put("b/2.png", png(|picture| picture.pixels[321] ^= 1));
     let different = format!("2.png differs: {FIRST}\n1 of 2 pairs differs\n");
     says(world.diff(&["a", "b/"]), 1, &different, "");
-    // What is missing comes first, and the rest is compared all the same.
+    // Missing files are reported first, and the rest is compared nevertheless.
     world.put("a/0.dump", page(|_| {}));
     world.put("b/1.png", png(|_| {}));
     says(
@@ -351,7 +351,7 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
             }
         }
     }
-    // Both are told. A folder's entry with the right ending may be a folder; a device has no end.
+    // Both are reported. A folder's entry with the right extension may be a folder; a device has no end.
     let both = world.diff(&["gone", "text"]);
     assert!(
         both.errors
@@ -435,7 +435,7 @@ fn the_report_shows_every_pair_that_differs() {
         let address = format!("href=\"./it%20differs-files/{file}\"");
         assert!(html.contains(&address), "{address}");
     }
-    // The copies are the originals, and the pictures are those of the dumps.
+    // The copies equal the originals, and the PNGs those of the dumps.
     for (of, folder) in [("expected", "a"), ("got", "b")] {
         let copy = world.read(&format!("it differs-files/1.dump-{of}.dump"));
         assert!(copy == world.read(&format!("{folder}/1.dump")));
@@ -471,7 +471,7 @@ fn a_report_of_equal_files_says_so_and_has_no_folder() {
     assert_eq!(said.code, Some(0), "{said:?}");
     assert!(world.read("r.html").contains("<h1>Nothing differs</h1>"));
     assert!(!world.path("r-files").exists());
-    // And one of files that could not be compared does not say it.
+    // A report about files that could not be compared does not claim that nothing differs.
     let said = world.diff(&["a.png", "gone", "--report", "r.html"]);
     assert_eq!(said.code, Some(2), "{said:?}");
     let html = world.read("r.html");

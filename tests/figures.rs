@@ -11,9 +11,9 @@ use setup::Options;
 
 use crate::ready;
 
-/// How long the running show is watched.
+/// How long the running demo is observed.
 const WATCHED: Duration = Duration::from_secs(60);
-/// Boots that the times are the median of.
+/// Boots; their times' median is reported.
 const BOOTS: usize = 5;
 
 #[test]
@@ -102,7 +102,7 @@ fn figures() {
         machine
             .ask(Command::Show(Picture::Frame(frame)))
             .expect("shows");
-        // The pages' first pictures paint all of the background; the third round is the rule.
+        // The first frame of each page paints all of the background; the third round is typical.
         for _ in 0..5 {
             machine
                 .ask(Command::Show(Picture::Frame(frame)))
@@ -116,7 +116,7 @@ fn figures() {
     machine.leave().expect("leaves");
 }
 
-/// Verifies goldens, and tells how long it took.
+/// Verifies goldens, and returns the time that it needed.
 fn verify(
     goldens: &[Golden],
     emulated: &mut Emulated<'_>,

@@ -1,12 +1,11 @@
-//! Files in any state: whatever a user's model or an image's ramdisk is, it is refused in words or
-//! drawn, and nothing panics.
+//! Files in any state: whatever a user's model or an image's ramdisk contains, it is refused with a message
+//! or drawn, and nothing panics.
 //!
-//! Good files are changed at random, so that they come through the first checks and to the later
-//! ones. The checksums of a pack and of a PNG's chunks are made to fit again, or nothing behind them
-//! would be reached. What is accepted is drawn. A message of refusal is short and holds nothing that
-//! a terminal obeys. `cargo test` does this for a second or so; `cargo fuzz-models` does it for two
-//! minutes, or as many as `CRYSTAL_BALL_FUZZ_MINUTES` says, from the seed `CRYSTAL_BALL_FUZZ_SEED`, or
-//! a fresh one.
+//! Good files are changed at random, so that they pass the first checks and reach the later ones. The
+//! checksums of a pack and of a PNG's chunks are recomputed, or nothing behind the checksum would be reached.
+//! Every accepted file is drawn. A refusal's message is short and contains no terminal control sequence.
+//! `cargo test` does this for about a second. `cargo fuzz-models` does it for two minutes, or
+//! `CRYSTAL_BALL_FUZZ_MINUTES`, from the seed `CRYSTAL_BALL_FUZZ_SEED`, or a fresh one.
 
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
@@ -23,10 +22,10 @@ use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use scene::{MAX_EXTENT, Mesh, Pose, Stage, Storage};
 use texmap::{Mapper, Texture};
 
-/// Where a pack's counts begin, after magic, version, length and checksum.
+/// The offset of a pack's counts, after magic, version, length and checksum.
 const COUNTS: usize = 20;
 
-/// Tells the seed of a case that panicked.
+/// Prints the seed of a case that panicked.
 struct Case(u64);
 
 impl Drop for Case {
@@ -37,7 +36,7 @@ impl Drop for Case {
     }
 }
 
-/// What is drawn on, kept from case to case.
+/// Memory for drawing, kept from case to case.
 struct Room {
     arena: InPlace<Arena>,
     storage: InPlace<Storage>,
@@ -55,7 +54,7 @@ impl Room {
         }
     }
 
-    /// Draws an accepted pack in some pose, by some mapper.
+    /// Draws an accepted pack in a random pose, with a random mapper.
     fn draw(&mut self, pack: &Pack<'_>, random: &mut Rng) {
         let entry = pack.entry(&mut self.arena);
         let textures = entry.paint(&mut self.painted);
@@ -74,7 +73,7 @@ impl Room {
     }
 }
 
-/// OBJs that are good, each with something of its own.
+/// Valid OBJs, each with a different feature.
 fn objs() -> Vec<Vec<u8>> {
     let mut ball = String::from("o ball\n");
     let (rings, segments) = (7, 9);
@@ -118,7 +117,7 @@ fn objs() -> Vec<Vec<u8>> {
     ]
 }
 
-/// A pack of an OBJ, with a plain texture.
+/// A pack from an OBJ, with a plain texture.
 fn packed(text: &[u8], picture: (u32, u32)) -> anyhow::Result<Vec<u8>> {
     let (solid, layout) = solid(&obj::parse(text)?, picture)?;
     let (width, height) = layout.size();
@@ -139,8 +138,8 @@ fn packed(text: &[u8], picture: (u32, u32)) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Runs cases of a kind, each from a seed of its own, until `more` says no; returns how many there
-/// were, and how many were accepted.
+/// Runs cases of a kind, each from its own seed, until `more` returns false. Returns how many cases ran, and
+/// how many were accepted.
 fn run(
     first: u64,
     mut more: impl FnMut(u64) -> bool,
@@ -155,7 +154,7 @@ fn run(
     (cases, accepted)
 }
 
-/// Numbers that are at the border of something, as a pack has them.
+/// Numbers at the borders of ranges, in a pack's format.
 fn number(random: &mut Rng) -> i32 {
     let borders = [
         0,
@@ -184,18 +183,18 @@ fn number(random: &mut Rng) -> i32 {
     }
 }
 
-/// A pack, changed; true if it was accepted all the same.
+/// Changes a pack; returns whether it was accepted nevertheless.
 fn pack_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
     let before = random.choice(good).unwrap();
     let mut bytes = before.clone();
     for _ in 0..random.usize(1..6) {
-        // Most of a pack is its light table, of which any byte is as good as another.
+        // Most of a pack is its light table, in which any byte is valid.
         let at = match random.u8(..4) {
             0 => random.usize(..COUNTS + 10),
             1 => random.usize(..bytes.len()),
             _ => random.usize(bytes.len() * 2 / 3..bytes.len()),
         };
-        // It may have been cut before.
+        // An earlier change may have cut it.
         let at = at.min(bytes.len() - 1);
         match random.u8(..8) {
             0 => bytes[at] ^= 1 << random.u8(..8),
@@ -212,7 +211,7 @@ fn pack_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
         assert!(Pack::parse(&bytes).is_err(), "a change went unnoticed");
     }
     if random.u8(..8) > 0 && bytes.len() > COUNTS {
-        // Magic and version stand, length and checksum fit.
+        // Magic and version stay; length and checksum are recomputed.
         bytes[..12].copy_from_slice(&before[..12]);
         let length = (bytes.len() as u32).to_le_bytes();
         bytes[12..16].copy_from_slice(&length);
@@ -232,14 +231,14 @@ fn pack_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
     }
 }
 
-/// Whether a message may go to a terminal.
+/// Checks that a message may be printed on a terminal.
 fn check_message(error: &anyhow::Error) {
     let message = format!("{error:#}");
     assert!(!message.is_empty() && message.len() < 400, "{message:?}");
     assert!(!message.contains(char::is_control), "{message:?}");
 }
 
-/// An OBJ, changed; true if it makes a model all the same, which is then drawn.
+/// Changes an OBJ; returns whether it makes a model nevertheless, which is then drawn.
 fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
     const WORDS: [&str; 46] = [
         "0",
@@ -323,7 +322,7 @@ fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
         .choice(&[(16, 16), (1, 1), (5, 300), (8192, 1)])
         .unwrap();
     if random.u8(..16) == 0 {
-        // All of the way, where formats are named, too.
+        // The whole path, including the messages that name formats.
         return Model::new(&text, None).inspect_err(check_message).is_ok();
     }
     match packed(&text, picture) {
@@ -340,8 +339,8 @@ fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
     }
 }
 
-/// A text in the way of another program: other line ends, other blanks, lines that go on, a mark at
-/// its beginning, a beginning that is another format's.
+/// Rewrites a text in the style of another program: other line ends, other blanks, continued lines, a byte
+/// order mark, or the beginning of another format.
 fn rewritten(text: Vec<u8>, random: &mut Rng) -> Vec<u8> {
     const BEGINNINGS: [&[u8]; 8] = [
         b"\xef\xbb\xbf",
@@ -386,7 +385,7 @@ fn chunks(png: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
     chunks
 }
 
-/// A PNG, its chunks changed, each with a checksum that fits; true if it can be read all the same.
+/// Changes a PNG's chunks and recomputes their checksums; returns whether the PNG can be read nevertheless.
 fn chunks_case(good: &[Vec<u8>], random: &mut Rng) -> bool {
     let mut chunks = chunks(random.choice(good).unwrap());
     for _ in 0..random.usize(1..4) {
@@ -431,7 +430,7 @@ fn chunks_case(good: &[Vec<u8>], random: &mut Rng) -> bool {
     is_read(&bytes)
 }
 
-/// A PNG, changed; true if it can be read all the same.
+/// Changes a PNG's bytes; returns whether it can be read nevertheless.
 fn png_case(good: &[Vec<u8>], random: &mut Rng) -> bool {
     let mut bytes = random.choice(good).unwrap().clone();
     for _ in 0..random.usize(1..4) {
@@ -444,9 +443,9 @@ fn png_case(good: &[Vec<u8>], random: &mut Rng) -> bool {
     is_read(&bytes)
 }
 
-/// Whether bytes are read as a picture, or by `diff`, which must not panic either.
+/// Whether bytes can be read as a texture. Also reads them as `diff` does, which must not panic either.
 fn is_read(bytes: &[u8]) -> bool {
-    // The program looks at a header's size first, too.
+    // The program also checks the size in the header first.
     let header = png::Decoder::new(Cursor::new(bytes))
         .read_header_info()
         .map(|header| u64::from(header.width) * u64::from(header.height));
@@ -466,7 +465,7 @@ fn is_read(bytes: &[u8]) -> bool {
     }
 }
 
-/// PNGs of some colours, of all kinds.
+/// PNGs with a few colours, of all kinds.
 fn pngs() -> Vec<Vec<u8>> {
     use png::BitDepth::{Eight, Four, One, Sixteen};
     use png::ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
@@ -502,7 +501,7 @@ fn pngs() -> Vec<Vec<u8>> {
     kinds.iter().map(made).collect()
 }
 
-/// All of them, each as long as its `more` says.
+/// Runs all kinds, each until its `more` returns false.
 fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
     let mut room = Room::new();
     let objs = objs();
@@ -524,8 +523,9 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
             "{kind}: {cases} cases from seed {seed}, {accepted} of them accepted, {:.1} s",
             begun.elapsed().as_secs_f64()
         );
-        // Fewer, and nothing behind the first checks was reached; more, and nothing was wrong. Of
-        // each kind a twentieth at least is accepted: a few cases may be all of one sort.
+        // If fewer cases were accepted, nothing behind the first checks was reached; if all were, nothing was
+        // wrong. In practice at least a twentieth of each kind is accepted; the limit is a hundredth, since
+        // the cases of a short run may be of one sort.
         let some = accepted * 100 > cases && accepted < cases;
         assert!(some || cases < 1000, "{kind}");
     };
@@ -551,7 +551,7 @@ fn nothing_in_any_state_panics_for_minutes() {
         Err(_) => default,
     };
     let minutes: f64 = number("CRYSTAL_BALL_FUZZ_MINUTES", 2.0);
-    // No larger than an `f64` holds.
+    // Small enough that an `f64` is exact.
     let fresh = fastrand::u64(..1 << 48);
     let seed = number("CRYSTAL_BALL_FUZZ_SEED", fresh as f64) as u64;
     let mut begun: Option<(String, Instant)> = None;

@@ -1,9 +1,9 @@
-//! Why edges are integers: the gaps of the Black Book's figure 57.1, made again and counted.
+//! Why edges are integers: reproduces and counts the gaps of the Black Book's figure 57.1.
 //!
-//! A sheet of quadrilaterals, turned, its fields drawn by two ways of finding edges by turns: all
-//! in integers from whole-pixel vertices, and in 16.16 fixed point from the vertices as they are.
-//! Either way alone may do; where the two meet, pixels are left out and others are written twice.
-//! Beside it the same sheet as this project draws it, every field by one exact rule.
+//! The figure is a turned sheet of quadrilaterals. Its fields alternate between two methods of finding edges:
+//! integers from whole-pixel vertices, and 16.16 fixed point from the exact vertices. Each method would do on
+//! its own; where the two meet, pixels are left out and others are written twice. Beside it is the same sheet
+//! as this project draws it, every field by one exact rule.
 //!
 //! `cargo gaps` writes `docs/gaps.png`.
 
@@ -17,10 +17,10 @@ use texmap::{Face, JobList, Mapper, Order, Renderer, Texture, Vertex};
 
 /// Fields of the sheet across and down.
 const FIELDS: (i32, i32) = (9, 7);
-/// Pixels from a corner of the sheet to the next.
+/// Pixels from one corner of the sheet to the next.
 const SIDE: f64 = 23.7;
 
-/// How often each pixel was written, and by which kind of field last.
+/// How often each pixel was written, and the kind of field that wrote it last.
 struct Page {
     times: Vec<u8>,
     kind: Vec<u8>,
@@ -39,8 +39,8 @@ impl Page {
         self.kind[y * WIDTH + x] = kind;
     }
 
-    /// Pixels of the sheet that nothing wrote, and those that two fields wrote. The sheet is where
-    /// one field or another is on both sides.
+    /// Counts the pixels of the sheet that no field wrote, and those that two fields wrote. A pixel belongs
+    /// to the sheet if its neighbours on two opposite sides are written.
     fn faults(&self) -> (usize, usize) {
         let written = |i: usize| self.times[i] > 0;
         let gap = |&i: &usize| {
@@ -62,7 +62,7 @@ fn corner(i: i32, j: i32) -> (f64, f64) {
     (160.0 + x * cos - y * sin, 120.0 + x * sin + y * cos)
 }
 
-/// Each field's four corners, and which kind it is.
+/// Each field's four corners and its kind.
 fn sheet() -> impl Iterator<Item = ([(f64, f64); 4], u8)> {
     (0..FIELDS.1).flat_map(|j| {
         (0..FIELDS.0).map(move |i| {
@@ -77,7 +77,7 @@ fn sheet() -> impl Iterator<Item = ([(f64, f64); 4], u8)> {
     })
 }
 
-/// Rows from the topmost vertex to the lowest, between the edges' x as `scan` steps them.
+/// Calls `scan` for each row from the topmost vertex to the lowest, between the x of the edges.
 fn by_rows(corners: [(f64, f64); 4], mut scan: impl FnMut(i32, i32, i32)) {
     let fixed = corners.map(|(x, y)| [x, y].map(|k| (k * 65536.0).round() as i64));
     let mut spans = vec![(i64::MAX, i64::MIN); HEIGHT];
@@ -104,11 +104,11 @@ fn by_rows(corners: [(f64, f64); 4], mut scan: impl FnMut(i32, i32, i32)) {
     }
 }
 
-/// The sheet with its two ways of finding edges.
+/// The sheet with the two methods of finding edges.
 fn mixed() -> Page {
     let mut page = Page::new();
     for (corners, kind) in sheet() {
-        // All in integers: the vertices are whole pixels first.
+        // Integers only: the vertices are rounded to whole pixels first.
         let corners = match kind {
             0 => corners.map(|(x, y)| (x.round(), y.round())),
             _ => corners,
@@ -122,7 +122,7 @@ fn mixed() -> Page {
     page
 }
 
-/// Passes columns on to a page in RAM, and notes where they were.
+/// Passes columns on to a page in RAM, and counts each pixel.
 struct Noted<'a>(&'a mut Page, u8, PlanarBuffer);
 
 impl Destination for Noted<'_> {
@@ -160,7 +160,7 @@ fn exact() -> Page {
         renderer.face(&Face {
             polygon: &polygon,
             texture: 0,
-            // Affine: no plane is asked for.
+            // Affine: no plane is needed.
             anchors: [Anchor::default(); 3],
             focal_length: 1,
         });
@@ -214,7 +214,7 @@ fn picture() {
         let (gaps, doubles) = page.faults();
         println!("{name}: {gaps} pixels left out, {doubles} written twice");
     }
-    // Each pixel two by two, so that one that is left out can be seen.
+    // Each pixel two by two, so that a missing pixel is visible.
     let wide = pixels.chunks(2 * WIDTH).flat_map(|row| {
         let row: Vec<u8> = row.iter().flat_map(|&pixel| [pixel; 2]).collect();
         [row.clone(), row].concat()

@@ -1,7 +1,7 @@
-//! Golden frames, each on four witnesses: QEMU's card, the emulated card, the committed picture,
-//! and QEMU's screen. `frames::golden` says what is compared.
+//! Golden frames, each with four witnesses: QEMU's card, the emulated VGA, the committed PNG, and QEMU's
+//! screen. `frames::golden` describes what is compared.
 //!
-//! Findings are collected over all goldens before the verdict, and a report shows them
+//! Findings of all goldens are collected before the verdict, and a report shows them
 //! (`target/crystal-ball/golden/report.html`).
 
 use std::mem::discriminant;
@@ -25,13 +25,13 @@ pub fn goldens() -> Vec<Golden> {
     golden::find(&golden_folder()).expect("the golden frames")
 }
 
-/// Where a test leaves its report if it fails.
+/// The path of a test's report, which is written on failure.
 fn report(test: &str) -> PathBuf {
     let image = READY.image.with_file_name("golden");
     image.join(test).join("report.html")
 }
 
-/// Fails with all that was found.
+/// Fails with all findings.
 #[track_caller]
 fn conclude(findings: Findings, test: &str) {
     if let Err(wrong) = findings.verdict(&report(test)) {
@@ -52,9 +52,9 @@ fn emulated_card_draws_every_golden() {
     conclude(findings, "emulated");
 }
 
-/// The goldens whose bytes are sent and compared one by one; checksums stand for the bytes of the
-/// others. There is one for each family of mappers, and among them every order of drawing and
-/// every kind of scene: the bytes are what they are because of these three.
+/// The goldens whose bytes are sent and compared one by one; for the others, checksums are compared. The list
+/// has a golden for each family of mappers, and among them every order of drawing and every kind of scene:
+/// mapper, order and scene determine a frame's bytes.
 const BYTE_BY_BYTE: [&str; 11] = [
     // Affine columns, on the ball.
     "frame-last",
@@ -68,13 +68,13 @@ const BYTE_BY_BYTE: [&str; 11] = [
     "mapper-linear-4",
     // Quadratic pieces, on a single face.
     "mapper-quadratic",
-    // Columns or rows, on the knot, by way of RAM.
+    // Columns or rows, on the knot, through RAM.
     "knot-inside",
     // Tiles of 16 x 16 pixels.
     "mapper-tiles-16",
-    // Lines of constant depth in any direction, by way of RAM.
+    // Lines of constant depth in any direction, through RAM.
     "order-free-in-buffer",
-    // Columns of constant depth, on tiled textures with mipmaps, by way of RAM.
+    // Columns of constant depth, on tiled textures with mipmaps, through RAM.
     "corridor-level",
     // Within a chosen error, on the knot, by planes.
     "knot-edge-on",
@@ -100,7 +100,7 @@ fn qemu_shows_and_holds_every_golden() {
     conclude(findings, "qemu");
 }
 
-/// What kind of scene a golden shows.
+/// The kind of scene that a golden shows.
 fn kind_of_scene(golden: &Golden) -> &'static str {
     match golden.look.scene.map_or("ball", |scene| scene.0) {
         "ball" | "cube" => "convex solid",
@@ -139,7 +139,7 @@ fn goldens_sent_byte_by_byte_are_of_every_kind() {
     assert_eq!(of_kind, [""; 0], "no golden of such a scene is sent");
 }
 
-/// Goldens for a quick look at a configuration.
+/// A few goldens, for a quick check of a configuration.
 pub fn few() -> Vec<Golden> {
     let names = ["erased-turn", "nearest", "speck"];
     let mut few = goldens();
@@ -148,7 +148,7 @@ pub fn few() -> Vec<Golden> {
     few
 }
 
-/// The adapters with a VGA core, another chipset, and the card's own retrace: QEMU's plain one
+/// The adapters with a VGA core, another chipset, and QEMU's precise retrace: the standard retrace bit
 /// flickers at every read.
 #[test]
 fn a_few_configurations_agree() {
@@ -164,7 +164,7 @@ fn a_few_configurations_agree() {
     }
 }
 
-/// A configuration.
+/// A configuration with this adapter and these arguments.
 pub fn with_arguments(ready: &Ready, vga: &str, arguments: &str) -> Config {
     Config {
         vga: vga.into(),
@@ -176,7 +176,7 @@ pub fn with_arguments(ready: &Ready, vga: &str, arguments: &str) -> Config {
 /// Boots a configuration and checks goldens by checksum and screen.
 ///
 /// # Errors
-/// A boot that fails, and the first goldens that differ.
+/// If the boot fails, or goldens differ.
 pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
     let mut machine = Machine::boot(config)?;
     let mut memory = card::memory();
@@ -189,8 +189,8 @@ pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
     findings.verdict(&report("configuration"))
 }
 
-/// What is asked of a boot to be the same as of every other: all of video memory after three
-/// pictures, and what drawing them took.
+/// Evidence that must be equal for every boot: all of video memory after three frames, and the counts of
+/// drawing them.
 pub fn evidence(config: &Config) -> anyhow::Result<Vec<String>> {
     let mut machine = Machine::boot(config)?;
     machine.show(&[0, 480, u32::MAX].map(Picture::Frame))?;
@@ -200,7 +200,7 @@ pub fn evidence(config: &Config) -> anyhow::Result<Vec<String>> {
     Ok(evidence)
 }
 
-/// What the emulated card says to the same.
+/// The emulated VGA's evidence for the same frames.
 pub fn emulated_evidence() -> Vec<String> {
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
@@ -227,7 +227,7 @@ fn two_goldens() -> TempDir {
     copy
 }
 
-/// What checking a folder finds.
+/// The findings of a folder's check.
 fn found(folder: &Path) -> Vec<String> {
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
@@ -248,14 +248,14 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
     let wrong = found(copy.path());
     assert_eq!(wrong.len(), 1);
     assert!(wrong[0].starts_with("belt: "), "{wrong:?}");
-    // One that is none.
+    // A broken PNG.
     std::fs::write(at("belt.png"), b"\x89PNG").unwrap();
     let wrong = found(copy.path());
     assert!(wrong[0].contains("belt.png is no golden"), "{wrong:?}");
     std::fs::remove_file(at("belt.png")).unwrap();
     let wrong = found(copy.path());
     assert!(wrong[0].contains("never blessed"), "{wrong:?}");
-    // An orphan, a description that is none, a stranger, nothing at all.
+    // An orphan, an invalid description, an unrelated file, an empty folder.
     let refused = |words: &str| {
         let error = format!("{:#}", golden::find(copy.path()).unwrap_err());
         assert!(error.contains(words), "{error}");
@@ -283,7 +283,7 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
     refused("has no golden frames");
 }
 
-/// A picture that is not the one that was asked for, as like it as it may be.
+/// The wrong frame is found even if it is as similar as possible to the right one.
 #[test]
 fn the_wrong_frame_is_found() {
     let mut memory = card::memory();
@@ -301,7 +301,7 @@ fn the_wrong_frame_is_found() {
     assert!(found.contains("picture: expected 480, got 481"), "{found}");
 }
 
-/// By the program itself: what changes is told and shown, QEMU is asked, the PNGs are written.
+/// Runs the program: it prints and shows the changes, boots QEMU, and writes the PNGs.
 #[test]
 fn a_blessing_tells_what_changes_and_makes_the_goldens() {
     LazyLock::force(&READY);
@@ -330,7 +330,7 @@ fn a_blessing_tells_what_changes_and_makes_the_goldens() {
     assert!(bless().contains("nothing to bless"));
 }
 
-/// A stray write anywhere is seen: on a hidden page, behind the last one, in another plane.
+/// Finds a stray write anywhere: on a hidden page, after the last page, in another plane.
 #[test]
 fn all_of_video_memory_is_as_the_emulated_card_has_it() {
     let mut memory = card::memory();
@@ -356,8 +356,7 @@ fn all_of_video_memory_is_as_the_emulated_card_has_it() {
     conclude(findings, "memory");
 }
 
-/// By the program itself: the files of `dump` and of `emulate` are the same bytes, and `diff` says
-/// so.
+/// Runs the program: `dump` and `emulate` write files with the same bytes, and `diff` confirms it.
 #[test]
 fn emulate_writes_what_dump_writes() {
     LazyLock::force(&READY);
@@ -385,7 +384,7 @@ fn emulate_writes_what_dump_writes() {
             );
         }
     }
-    // Five pictures, a text and a PNG of each.
+    // Five frames, with a text and a PNG of each.
     assert_eq!(
         crystal_ball(&["diff", "a", "b"]),
         "equal: 10 pairs, 953344 pixels\n"
@@ -408,7 +407,7 @@ fn emulate_writes_what_dump_writes() {
     assert!(alone == after);
 }
 
-/// A write as it reaches the card, a byte at a time.
+/// A write to the card, one byte at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Write {
     Port(u16, u8),
@@ -416,7 +415,7 @@ enum Write {
 }
 
 impl Write {
-    /// From a line of QEMU's trace; none if it is of another device.
+    /// Parses a line of QEMU's trace; `None` for another device.
     fn traced(line: &str) -> Option<Self> {
         let hex = |name: &str| {
             let mut words = line.split([' ', ',']).skip_while(|word| *word != name);
@@ -434,7 +433,7 @@ impl Write {
         ours.then(|| Self::Memory((at - 0xA_0000) as u16, value as u8))
     }
 
-    /// From the emulated card's log: a word to a port goes to it and the next one.
+    /// The writes of an access in the emulated VGA's log: a word goes to its port and the next port.
     fn logged(access: &Access) -> Vec<Self> {
         match *access {
             Access::Out8(port, value) => vec![Self::Port(port, value)],
@@ -448,9 +447,8 @@ impl Write {
     }
 }
 
-/// QEMU's own record of every write, against the emulated card's: a witness that neither the
-/// kernel nor this project made. So one Map Mask write for each column is a fact, and not the
-/// kernel's word.
+/// Compares QEMU's own record of every write with the emulated VGA's log. Neither the kernel nor this project
+/// made that record, so it proves without the kernel's word that each column needs only one Map Mask write.
 #[test]
 fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
     let folder = tempfile::tempdir().unwrap();
@@ -460,7 +458,7 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
     let mut machine = Machine::boot(&config).unwrap();
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
-    // The fourth picture erases what the first left on its page.
+    // The fourth frame erases what the first left on its page.
     let before = [0, 60, 120].map(Picture::Frame);
     emulated.show(&before).unwrap();
     machine.show(&before).unwrap();
@@ -487,7 +485,7 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
         );
     }
     assert_eq!(traced.len(), logged.len(), "one of the two goes on");
-    // 3C4h index 2 is Map Mask: once to erase, and once for each column that was drawn.
+    // 3C4h index 2 is Map Mask: one write to erase, and one for each column drawn.
     let map_masks = traced
         .windows(2)
         .filter(|pair| matches!(pair, [Write::Port(0x3C4, 2), Write::Port(0x3C5, _)]));

@@ -1,6 +1,6 @@
 //! The tests of the host program that need no QEMU, all in one program: it is linked once.
 //!
-//! `cargo test --test host diff::` runs those of one module.
+//! `cargo test --test host diff::` runs the tests of one module.
 
 mod diff;
 mod fuzz;

@@ -1,4 +1,4 @@
-//! Files of the user's own: which make a model, which are refused, and in which words.
+//! Users' files: which make a model, which are refused, and with which messages.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -22,7 +22,7 @@ fn files() -> TempDir {
     folder
 }
 
-/// Writes a PNG of 8 bits a part.
+/// Writes a PNG with 8 bits a channel.
 fn write_png(path: &Path, (width, height): (u32, u32), colour: png::ColorType, pixels: &[u8]) {
     let mut encoder = png::Encoder::new(fs::File::create(path).unwrap(), width, height);
     encoder.set_color(colour);
@@ -31,7 +31,7 @@ fn write_png(path: &Path, (width, height): (u32, u32), colour: png::ColorType, p
     writer.finish().unwrap();
 }
 
-/// Runs the program in a folder; its exit code and its words.
+/// Runs the program in a folder; returns its exit code and its messages.
 fn run(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     let output = Process::new(env!("CARGO_BIN_EXE_crystal-ball"))
         .current_dir(folder)
@@ -60,19 +60,19 @@ fn png_of(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
     bytes
 }
 
-/// A PNG's header: its size, depth and kind of colour.
+/// A PNG's header: size, depth and colour type.
 fn png_header(width: u32, height: u32, depth: u8, colour: u8) -> Vec<u8> {
     let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
     [&size[..], &[depth, colour, 0, 0, 0]].concat()
 }
 
-/// A PNG that says it has so many pixels, and has none.
+/// A PNG whose header gives a size, but which contains no pixels.
 fn empty_png(width: u32, height: u32) -> Vec<u8> {
     let header = png_header(width, height, 8, 2);
     png_of(&[(b"IHDR", &header), (b"IDAT", &[]), (b"IEND", &[])])
 }
 
-/// A PNG with a palette of so many bytes.
+/// A PNG with a palette of `bytes` bytes.
 fn palette_png(bytes: usize) -> Vec<u8> {
     let header = png_header(1, 1, 8, 3);
     let palette = vec![9; bytes];
@@ -94,14 +94,14 @@ fn apart(triangles: usize) -> String {
         .collect()
 }
 
-/// A cube, each side with all of its texture.
+/// A cube; each side shows the whole texture.
 const CUBE: &str = "v -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\n\
                     v -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\n\
                     vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n\
                     f 5/1 6/2 7/3 8/4\nf 2/1 1/2 4/3 3/4\nf 1/1 5/2 8/3 4/4\n\
                     f 6/1 2/2 3/3 7/4\nf 8/1 7/2 3/3 4/4\nf 1/1 2/2 6/3 5/4\n";
 
-/// Runs `emulate` on a model in a folder; the exit code, what the program says, and the frame.
+/// Runs `emulate` on a model in a folder; returns the exit code, the messages, and the frame.
 fn emulate(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Option<Vec<u8>>) {
     let out = folder.join("dumps");
     let _ = fs::remove_dir_all(&out);
@@ -109,7 +109,7 @@ fn emulate(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Option<Ve
     let (code, words) = run(folder, &all);
     let unsafe_byte = |byte: u8| byte < b' ' && byte != b'\n' || byte == 0x7f;
     assert!(!words.bytes().any(unsafe_byte), "{words:?}");
-    // As long as the longest that is meant to be: nothing of a file is repeated at length.
+    // The limit is the length of the longest intended message: a message never repeats much of a file.
     assert!(words.lines().all(|line| line.len() < 400), "{words}");
     (code, words, fs::read(out.join("frame-000000.dump")).ok())
 }
@@ -204,7 +204,7 @@ fn what_hides_under_transparency_is_not_drawn() {
     let folder = files();
     let path = folder.path();
     fs::write(path.join("a.obj"), CUBE).unwrap();
-    // Half hidden magenta, half green; and the same with grey in the magenta's place.
+    // Half hidden magenta, half green; and the same with grey in place of the magenta.
     let write = |name: &str, hidden: [u8; 4]| {
         let pixel = |i: usize| match i % 64 < 32 {
             true => hidden,
@@ -483,8 +483,8 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
     assert!(!path.join("dumps").exists(), "something was written");
 }
 
-/// Starts `emulate` on a model that comes through a pipe, and interrupts it when it has read what
-/// `feed` writes. The program opens the pipe only when it hears signals.
+/// Starts `emulate` on a model that comes through a pipe, and interrupts it when it has read what `feed`
+/// writes. The program opens the pipe only when it can receive signals.
 fn interrupted(signal: Signal, feed: impl FnOnce(fs::File) -> Option<fs::File>) {
     let folder = tempfile::tempdir().unwrap();
     let pipe = folder.path().join("pipe.obj");
@@ -515,12 +515,12 @@ fn interrupted(signal: Signal, feed: impl FnOnce(fs::File) -> Option<fs::File>) 
 
 #[test]
 fn interrupts_are_heard_while_a_model_is_read_and_while_it_is_made() {
-    // The pipe stays open: there may be more to come.
+    // The pipe stays open: more data could follow.
     interrupted(Signal::TERM, |mut pipe| {
         pipe.write_all(CUBE.as_bytes()).unwrap();
         Some(pipe)
     });
-    // All of it is there, and cutting it would take half a minute.
+    // The data is complete, and cutting it would last half a minute.
     let face = format!("f{}\n", " 1 2 3".repeat(682));
     let slow = format!("{CUBE}{}", face.repeat(12));
     interrupted(Signal::INT, |mut pipe| {

@@ -1,8 +1,8 @@
-//! Runs that must not go well.
+//! Runs that must fail.
 
 use qemu::Failure;
 
-/// A failure whose evidence goes when the test has ended well, and stays when it has not.
+/// A failure. Its evidence is removed if the test succeeds, and kept if the test fails.
 pub struct Judged(pub Failure);
 
 impl Drop for Judged {
@@ -13,7 +13,7 @@ impl Drop for Judged {
     }
 }
 
-/// What went wrong.
+/// Returns the failure of a run that must not succeed.
 #[track_caller]
 pub fn verdict<T: std::fmt::Debug>(result: anyhow::Result<T>) -> Failure {
     let error = result.expect_err("the run ended well");

@@ -1,6 +1,6 @@
-//! The serial line when it is bad: someone in the middle alters what the kernel says, or floods it.
+//! A faulty serial line: a tap in the middle alters the kernel's lines, or floods the host.
 //!
-//! QEMU is real and so is the image. What comes from QEMU is passed on to the program, altered.
+//! QEMU and the image are real. The tap passes QEMU's output on to the program, altered.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::Shutdown;
@@ -18,10 +18,10 @@ use qemu::{Config, Limits, Machine, Verdict};
 use crate::judged::{Judged, verdict};
 use crate::ready::config;
 
-/// What becomes of a line of the kernel's, its end included.
+/// Alters a line from the kernel; the line includes its end.
 type Alter = Box<dyn FnMut(&[u8]) -> Vec<u8> + Send>;
 
-/// A machine whose serial line goes through `alter`.
+/// A machine whose serial line passes through `alter`.
 fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Machine {
     let config = Config {
         arguments: arguments.into_iter().map(Into::into).collect(),
@@ -38,7 +38,7 @@ fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Machine {
     machine
 }
 
-/// The someone in the middle.
+/// The tap.
 fn pass_on(kernel: UnixStream, mut host: UnixStream, mut alter: Alter) {
     let (mut from_host, mut to_kernel) = (host.try_clone().unwrap(), kernel.try_clone().unwrap());
     thread::spawn(move || std::io::copy(&mut from_host, &mut to_kernel));
@@ -50,14 +50,14 @@ fn pass_on(kernel: UnixStream, mut host: UnixStream, mut alter: Alter) {
         }
         line.clear();
     }
-    // The other thread holds both sockets open, too.
+    // The other thread also keeps both sockets open.
     for socket in [host, kernel.into_inner()] {
         let _ = socket.shutdown(Shutdown::Both);
     }
 }
 
-/// How a dump ends of which a line is altered. `alter` sees the lines from `line 100` on with
-/// their number.
+/// Returns the result of a dump with an altered line. `alter` sees the lines from `line 100` on with their
+/// number.
 fn dump_altered(
     alter: impl FnMut(usize, &[u8]) -> Vec<u8> + Send + 'static,
 ) -> anyhow::Result<Dump> {
@@ -109,7 +109,7 @@ fn recorded() -> (Vec<u8>, Dump) {
     (sent.try_iter().flatten().collect(), dump)
 }
 
-/// What a line becomes, given its number.
+/// Alters a line, given its number.
 type Step = fn(usize, &[u8]) -> Vec<u8>;
 
 /// Recorded bytes after `step`, which sees the lines from `line 100` on.
@@ -126,7 +126,7 @@ fn altered(recorded: &[u8], step: Step) -> Vec<u8> {
     lines.flat_map(alter).collect()
 }
 
-/// One boot sends a dump; whatever could happen to its bytes then happens to them here.
+/// One boot sends a dump; the test then alters its bytes in every way that could happen.
 #[test]
 fn whatever_happens_to_a_dump_is_noticed_and_named() {
     let (bytes, dump) = recorded();
@@ -203,7 +203,7 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
     }
 }
 
-/// A fault that one line shows is the run's verdict; the next test has one that no single line shows.
+/// A fault in a single line is the run's verdict; in the next test no single line shows the fault.
 #[test]
 fn a_garbled_dump_ends_the_run() {
     let judged = judged(dump_altered(|n, line| {
@@ -234,7 +234,7 @@ fn swapped_lines_are_told_by_their_numbers() {
     assert!(words.contains("stands where 'line 100' should"), "{words}");
 }
 
-/// What a terminal does to every line changes nothing.
+/// The changes that a terminal makes to line ends have no effect.
 #[test]
 fn line_ends_of_a_terminal_are_accepted() {
     let returned = |_, line: &[u8]| [&line[..line.len() - 1], b"\r\n"].concat();
@@ -256,7 +256,7 @@ fn a_hang_in_the_middle_of_a_dump_is_a_hang() {
     assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }
 
-/// A non-maskable interrupt, which the kernel knows no reason for, strikes between two lines.
+/// A non-maskable interrupt, for which the kernel knows no reason, arrives between two lines.
 #[test]
 fn a_crash_in_the_middle_of_a_dump_is_told_with_its_registers() {
     let folder = tempfile::tempdir().unwrap();
@@ -280,8 +280,8 @@ fn a_crash_in_the_middle_of_a_dump_is_told_with_its_registers() {
     assert_eq!(report[0], "exception non-maskable interrupt (vector 2)");
 }
 
-/// Sends the interrupt by QEMU's monitor, and waits until it was taken. Meanwhile nobody reads
-/// what the kernel says, so it can't have come to the dump's end.
+/// Sends the interrupt through QEMU's monitor, and waits until QEMU has delivered it. Meanwhile nobody reads
+/// the kernel's output, so the kernel cannot have reached the end of the dump.
 fn strike(monitor: &Path) {
     let mut monitor = UnixStream::connect(monitor).unwrap();
     monitor.write_all(b"nmi\n").unwrap();
@@ -295,7 +295,7 @@ fn strike(monitor: &Path) {
     }
 }
 
-/// Nobody reads for a while: the kernel waits, and then everything is there and in order.
+/// Nobody reads for a while: the kernel waits, and then everything arrives in order.
 #[test]
 fn a_host_that_stops_reading_is_waited_for() {
     let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
@@ -308,7 +308,7 @@ fn a_host_that_stops_reading_is_waited_for() {
     };
     let mut machine = tapped(Vec::new(), Limits::default(), Box::new(alter));
     let mut asked = Vec::new();
-    // More than all buffers on the way hold.
+    // More than all buffers on the way can contain.
     for frame in 0..5 {
         asked.push(format!("show {frame}"));
         asked.push("dump".to_string());
@@ -354,7 +354,7 @@ fn noise_on_the_line_is_answered_and_survived() {
             "{answer:?}"
         );
     }
-    // A command in two parts, and one as a terminal sends it.
+    // A command in two parts, and a command as a terminal sends it.
     machine.send_raw(b"sho").unwrap();
     machine.rest(Duration::from_millis(50)).unwrap();
     machine.send_raw(b"w 3\r\n").unwrap();
@@ -363,7 +363,7 @@ fn noise_on_the_line_is_answered_and_survived() {
     machine.leave().unwrap();
 }
 
-/// A flood of lines that are none, each of them answered, and the picture is as it was.
+/// Sends a flood of invalid lines. Each gets an answer, and the frame does not change.
 #[test]
 fn a_flood_of_noise_changes_no_byte() {
     let mut machine = Machine::boot(&config()).unwrap();
@@ -371,13 +371,13 @@ fn a_flood_of_noise_changes_no_byte() {
     let before = machine.ask(Command::Checksums(Content::Memory)).unwrap();
     let mut state = seeded::generator().get_seed() << 1 | 1;
     let mut random = move || {
-        // Knuth's MMIX generator; its high bits are the good ones.
+        // Knuth's MMIX generator; only its high bits are good.
         state = state
             .wrapping_mul(6_364_136_223_846_793_005)
             .wrapping_add(1_442_695_040_888_963_407);
         (state >> 56) as u8
     };
-    // The flood ends in the middle of a line, and the LF after it ends that one.
+    // The flood ends in the middle of a line, and the LF after it ends that line.
     let flood: Vec<u8> = (0..100_000).map(|_| random()).chain([b'x']).collect();
     machine.send_raw(&flood).unwrap();
     machine.send_raw(b"\nversion\n").unwrap();
@@ -401,7 +401,7 @@ fn a_flood_of_noise_changes_no_byte() {
     machine.leave().unwrap();
 }
 
-/// Lines without an end, none of which is the answer: the wait has an end all the same.
+/// An endless flood of lines that are not the answer: the wait still ends.
 #[test]
 fn a_flood_of_the_kernels_ends_in_a_hang() {
     let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
@@ -411,7 +411,7 @@ fn a_flood_of_the_kernels_ends_in_a_hang() {
         let mut from_kernel = kernel.try_clone().unwrap();
         thread::spawn(move || std::io::copy(&mut from_kernel, &mut passed));
         thread::spawn(move || {
-            // It holds the line open, and asks the kernel nothing.
+            // Keeps the line open; the kernel receives nothing.
             let _kernel = kernel;
             let mut line = Vec::new();
             link::write_line(format_args!("flood"), |bytes| line.extend_from_slice(bytes));
@@ -421,7 +421,7 @@ fn a_flood_of_the_kernels_ends_in_a_hang() {
         host
     };
     let mut machine = Machine::boot_through(&config(), tap).unwrap();
-    // After this the kernel says nothing that could come between two lines of the flood.
+    // From here on the kernel sends nothing that could come between two lines of the flood.
     machine.wait_until_running().unwrap();
     machine.set_limits(Limits {
         answer: Duration::from_millis(200),

@@ -1,4 +1,4 @@
-//! The measuring kernel in real QEMU, and what is counted beside it.
+//! Runs the benchmark kernel in real QEMU, and checks the counts.
 
 use std::fmt::Write;
 use std::sync::LazyLock;
@@ -9,14 +9,14 @@ use texmap::{Mapper, Order};
 
 use crate::ready::READY;
 
-/// The mappers of the names.
+/// The mappers with these names.
 fn mappers(names: &[&str]) -> Vec<Mapper> {
     let named = names.iter().map(|name| Mapper::parse(name));
     named.map(|mapper| mapper.expect("a mapper")).collect()
 }
 
-/// One mapper of each kind. The run itself makes sure that figures repeat under `-icount`, that
-/// pixels are as many without it, and that QEMU and the emulated card hold the same pictures.
+/// Measures a mapper of each kind. The run itself checks that figures repeat under `-icount`, that the number
+/// of pixels is equal without it, and that QEMU and the emulated VGA draw the same frames.
 #[test]
 fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
     LazyLock::force(&READY);
@@ -45,18 +45,18 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
         ] {
             assert_eq!(row.cost(work).pixels, screen, "{name}: {work}");
         }
-        // A store, and a part of a counter and a branch, or more of it where nothing is unrolled.
+        // A store, and a share of a counter and a branch; the share is larger where nothing is unrolled.
         for work in [Work::BareRam, Work::BareCard] {
             let bare = a_pixel(work);
             assert!((1.0..4.5).contains(&bare), "{name}: {work} {bare}");
         }
-        // Eight bytes a store, a loop for each, and more of them than there are pixels.
+        // Eight bytes a store, with a loop iteration for each store, and more bytes than pixels.
         let present = a_pixel(Work::Present);
         assert!((0.2..8.0).contains(&present), "{name}: {present}");
-        // Texel, step and store at the least; the clear twins are no more than slow.
+        // At least texel, step and store; the reference implementations are slow, but not slower than this.
         let drawn = row.instructions_a_pixel();
         assert!((3.0..400.0).contains(&drawn), "{name}: {drawn}");
-        // Each is a part of the next.
+        // Each work includes the previous one.
         let parts = [
             Work::FrameFaces,
             Work::FrameJobs,
@@ -66,7 +66,7 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
         for pair in parts.windows(2) {
             assert!(a_pixel(pair[0]) < a_pixel(pair[1]), "{name}: {pair:?}");
         }
-        // What draws the same takes the same on either side of the card's window, but for Map Mask.
+        // The same drawing costs the same on either side of the card's window, apart from Map Mask.
         assert!(
             a_pixel(Work::ScreenRam) <= a_pixel(Work::ScreenCard),
             "{name}"
@@ -87,8 +87,7 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
     }
 }
 
-/// Counters in the way must not change what is drawn; and the counts are those that the orders are
-/// about.
+/// The counters must not change what is drawn, and each order has its characteristic counts.
 #[test]
 fn counting_changes_no_byte() {
     let mut memories = Memories::default();
@@ -98,7 +97,7 @@ fn counting_changes_no_byte() {
         for (name, order, _) in Order::ALL {
             let [plain, counted] = emulated.checksums(mapper, order).unwrap();
             assert_eq!(plain, counted, "{mapper} {name}");
-            // All but three works draw.
+            // All works but three draw.
             assert_eq!(plain.len(), Work::ALL.len() - 3, "{plain:?}");
             let accesses = emulated.accesses(mapper, order).unwrap();
             assert_eq!(accesses.flip.ports, 1, "{mapper} {name}");
@@ -111,7 +110,7 @@ fn counting_changes_no_byte() {
                 assert_eq!(accesses.erase.map_mask, 1, "{mapper} {name}");
             }
             if order == Order::Planes {
-                // Once more for each list of jobs that is full before the picture is drawn.
+                // Four more for each list of jobs that fills up before the frame is drawn.
                 let lists = accesses.draw.map_mask / 4;
                 assert_eq!(accesses.draw.map_mask % 4, 0, "{mapper}");
                 assert!((1..=3).contains(&lists), "{mapper}: {lists} lists");
@@ -124,7 +123,8 @@ fn counting_changes_no_byte() {
     }
 }
 
-/// Everything, as a table: `cargo test --release --test qemu -- --ignored --exact --nocapture measure::figures`.
+/// Prints everything as a table:
+/// `cargo test --release --test qemu -- --ignored --exact --nocapture measure::figures`.
 #[test]
 #[ignore = "measures for minutes; run it alone"]
 fn figures() {

@@ -1,4 +1,4 @@
-//! A model of the user's own, in real QEMU as on the emulated card.
+//! A user's model, in real QEMU and on the emulated VGA.
 
 use std::fs;
 
@@ -12,8 +12,8 @@ use tempfile::TempDir;
 
 use crate::ready;
 
-/// A pyramid on a star: two objects, a concave face, and faces with and without texture coordinates,
-/// some of them beyond the texture's border.
+/// A pyramid on a star: two objects, a concave face, and faces with and without texture coordinates, some of
+/// which lie beyond the texture's border.
 const OBJ: &str = "
 o star
 v 0 0 2\nv .5 0 .5\nv 2 0 0\nv .5 0 -.5\nv 0 0 -2\nv -.5 0 -.5\nv -2 0 0\nv -.5 0 .5
@@ -47,7 +47,8 @@ fn model() -> Model {
     Model::load(&obj, Some(&png)).unwrap()
 }
 
-/// A machine whose ramdisk holds these bytes. It has to take the pack of a checksum, if one is given.
+/// A machine whose ramdisk contains these bytes. If `pack` is a checksum, the machine must accept the pack
+/// with it.
 fn boot(ramdisk: Vec<u8>, pack: Option<u32>) -> Machine {
     let options = Options {
         ramdisk: Some(ramdisk),
@@ -86,7 +87,7 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
         assert_eq!(seen.header.pack, Some(pack.checksum()));
         assert_eq!(machine.screen().unwrap(), emulated.screen().unwrap());
     }
-    // A built-in scene is nobody's model, whatever the ramdisk holds.
+    // A built-in scene is no loaded model, whatever the ramdisk contains.
     let ball = Command::Set(Setting::Scene, Word::new("ball"));
     for card in [&mut machine as &mut dyn Asked, &mut emulated] {
         let scenes = card.asked(Command::Set(Setting::Scene, None));
@@ -97,7 +98,7 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
     machine.leave().unwrap();
 }
 
-/// Both cards, in one list.
+/// Allows both cards in one list.
 trait Asked {
     fn asked(&mut self, command: Command) -> Vec<String>;
     fn dumped(&mut self) -> frames::dump::Dump;

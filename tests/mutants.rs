@@ -1,13 +1,12 @@
-//! Whether the checks of the emulated VGA, of the Mode X driver, of coverage, of mappers that keep to
-//! an error and of visible spans can fail: `cargo named-mutants`.
+//! Shows that checks can fail: those of the emulated VGA, of the Mode X driver, of coverage, of mappers that
+//! keep to an error and of visible spans. Run by `cargo named-mutants`.
 //!
-//! A mutant is one mistake that could be made, planted into a copy of the workspace: in the driver,
-//! in the card that should find the driver's mistakes out, or in the renderer. The tests of the
-//! crates that it concerns are run there, and one of them at least must fail: where a mutant
-//! survives a test is missing.
+//! A mutant is a plausible mistake that is planted into a copy of the workspace: in the driver, in the
+//! emulated VGA that should detect the driver's mistakes, or in the renderer. The tests of the affected
+//! crates run there, and at least one of them must fail: if a mutant survives, a test is missing.
 //!
-//! A mutant names its place by the exact text, which must be in the file once. Every `cargo test`
-//! checks that, so the list can't rot.
+//! A mutant names its place by the exact text, which must occur in the file exactly once. Every `cargo test`
+//! checks that, so the list stays up to date.
 
 use std::fs::{self, File};
 use std::os::unix::process::CommandExt;
@@ -46,14 +45,14 @@ const VGA: &str = "boot/vga/src/vga.rs";
 const DRIVER: &str = "kernel/modex/src/driver.rs";
 const REGISTERS: &str = "kernel/modex/src/registers.rs";
 
-/// The crates whose tests must kill a mutant of the driver or of the card.
+/// The crates whose tests must kill a mutant of the driver or of the emulated VGA.
 const CARD: [&str; 2] = ["--package=vga", "--package=modex"];
 /// The crates whose tests must kill a mutant of coverage or of a mapper.
 const MAPPER: [&str; 2] = ["--package=texmap", "--package=oracle"];
-/// Those whose tests must kill a mutant of what is seen.
+/// The crates whose tests must kill a mutant of visibility.
 const SEEN: [&str; 2] = ["--package=scene", "--package=oracle"];
 
-/// Columns: name; file; text; what it becomes.
+/// Columns: name; file; text; replacement.
 #[rustfmt::skip]
 const MUTANTS: &[Mutant] = &[
     // The driver.
@@ -119,7 +118,7 @@ const MUTANTS: &[Mutant] = &[
         "write(&mut self.bus, GRAPHICS, READ_MAP, read_map);", ""),
     mutant("doubleword addresses", REGISTERS,
         "0x00, 0xE7, 0x06, // Byte", "0x40, 0xE7, 0x06, // Byte"),
-    // The emulated card.
+    // The emulated VGA.
     mutant("latches not loaded", MEMORY,
         "self.latches = self.planes[usize::from(at)];", "let _ = at;"),
     mutant("only the latch that is read loaded", MEMORY,
@@ -201,7 +200,7 @@ const MUTANTS: &[Mutant] = &[
         "(0..len).find(needs_no_clamp).unwrap_or(len)", "(0..len).find(needs_no_clamp).unwrap_or(len).min(0)"),
     mutant("a quotient rounded", EXACT,
         "(a / c) as usize", "((a + c / 2) / c) as usize"),
-    // What keeps to an error, and what is seen.
+    // Mappers within an error, and visibility.
     mutant("a line kept that errs too much", ADAPTIVE,
         "depth > 0 && self.near * self.chords.cut(depth) >= self.least", "depth > 0"),
     mutant("a clamped end not paid for", ADAPTIVE,
@@ -250,7 +249,7 @@ const fn mutant(
 }
 
 impl Mutant {
-    /// The file with the mistake in it.
+    /// Returns the file's text with the mistake in it.
     fn planted(&self, source: &str) -> Result<String, String> {
         match source.matches(self.from).count() {
             1 => Ok(source.replacen(self.from, self.to, 1)),
@@ -262,7 +261,7 @@ impl Mutant {
     }
 }
 
-/// The most that one run of cargo may take: a hundred times what it does.
+/// Longest time of a run of cargo: a hundred times the usual time.
 const LIMIT: Duration = Duration::from_secs(300);
 
 #[test]
@@ -309,28 +308,28 @@ fn every_mutant_is_killed() {
     );
 }
 
-/// What became of a mutant.
+/// The result of a mutant.
 enum Fate {
-    /// By these tests.
+    /// Killed by these tests.
     Killed(Vec<String>),
     Survived,
-    /// It says nothing about the tests.
+    /// An error, which says nothing about the tests.
     Error(String),
 }
 
-/// A copy of the workspace, with a target folder of its own that all mutants share.
+/// A copy of the workspace, with a separate target folder that all mutants share.
 struct Copy {
     folder: TempDir,
 }
 
-/// How a run of cargo ended.
+/// Whether a run of cargo succeeded, and its output.
 struct Run {
     well: bool,
     output: String,
 }
 
 impl Copy {
-    /// The files that git knows or would add, as they are now.
+    /// Copies the files that git tracks or would add, in their present state.
     fn new() -> Self {
         let mut git = Command::new("git");
         git.args([
@@ -348,7 +347,7 @@ impl Copy {
         let files = String::from_utf8(files.stdout).unwrap();
         for file in files.split_terminator('\0') {
             let from = root().join(file);
-            // One that was deleted is still known.
+            // A deleted file is still in git's list.
             if from.exists() {
                 let to = copy.source(file);
                 fs::create_dir_all(to.parent().unwrap()).unwrap();
@@ -362,7 +361,7 @@ impl Copy {
         self.folder.path().join("source").join(file)
     }
 
-    /// Plants the mutant, tests, and takes it out again.
+    /// Plants the mutant, runs the tests, and restores the file.
     fn fate(&self, mutant: &Mutant) -> Fate {
         let file = self.source(mutant.file);
         let source = fs::read_to_string(&file).unwrap();
@@ -394,7 +393,7 @@ impl Copy {
         Fate::Killed(killers)
     }
 
-    /// Cargo in the copy, on two crates.
+    /// Runs cargo in the copy, on two crates.
     fn cargo(&self, arguments: &[&str], packages: [&str; 2]) -> Run {
         let told = self.folder.path().join("output");
         let output = File::create(&told).unwrap();
@@ -406,12 +405,12 @@ impl Copy {
             .arg("--target-dir")
             .arg(self.folder.path().join("target"))
             .current_dir(self.source(""))
-            // A mutant changes one line: most of what was compiled before it can be used again.
+            // A mutant changes one line: most of the earlier compilation can be reused.
             .env("CARGO_INCREMENTAL", "1")
             .stdin(Stdio::null())
             .stdout(output.try_clone().unwrap())
             .stderr(output);
-        // A group of its own, so that a test that hangs ends with the cargo that started it.
+        // A separate process group, so that a hanging test ends with the cargo that started it.
         let mut cargo = cargo.process_group(0).spawn().expect("cargo runs");
         let by = Instant::now() + LIMIT;
         let status = loop {
@@ -419,7 +418,7 @@ impl Copy {
                 break Some(status);
             }
             if Instant::now() > by {
-                // It may have ended just now; then there is no group to kill.
+                // Cargo may have ended just now; then the group no longer exists.
                 let _ = kill_process_group(Pid::from_child(&cargo), Signal::KILL);
                 cargo.wait().unwrap();
                 break None;
@@ -437,7 +436,7 @@ impl Copy {
     }
 }
 
-/// The name of the test that a line of libtest's says has failed.
+/// Returns the name of the test that a line of libtest's output reports as failed.
 fn failed(line: &str) -> Option<String> {
     let name = line.strip_prefix("test ")?.strip_suffix(" ... FAILED")?;
     Some(name.trim_end_matches(" - should panic").to_owned())

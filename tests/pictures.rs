@@ -1,5 +1,5 @@
-//! Whole pictures against the oracle: every golden's, drawn again from the snapped polygons by the
-//! definitions, pixel by pixel, with background, light and palette indices.
+//! Whole frames against the oracle: draws every golden again from the snapped polygons by the definitions,
+//! pixel by pixel, with background, light and palette indices.
 
 use std::fmt;
 
@@ -15,8 +15,8 @@ use scene::{FOCAL_LENGTH, Pose, Stage, Storage};
 use texmap::loops::Loop;
 use texmap::{Face, Mapper, Point, Texture};
 
-/// The affine mapper's coordinates are within 2^-7 texel of the exact ones: 2^-8 where a whole
-/// texture is squeezed into a sliver, and 240 steps, each cut by less than 2^-16.
+/// The affine mapper's coordinates are within 2^-7 texel of the exact coordinates: 2^-8 where a whole texture
+/// is squeezed into a sliver, and 240 steps, each rounded by less than 2^-16.
 const AFFINE_BITS: u32 = 7;
 
 /// A golden's scene.
@@ -25,14 +25,14 @@ fn scene(golden: &Golden) -> &'static Entry<'static> {
     scene.unwrap_or(&CATALOGUE[0])
 }
 
-/// The pose of a golden's last picture.
+/// The pose of a golden's last frame.
 fn pose(golden: &Golden) -> Pose {
     let picture = golden.show.last().expect("a golden shows something");
     show::pose(scene(golden), *picture).expect("a golden's pose is legal")
 }
 
-/// What the definitions allow at each pixel: the colours, and how many polygons cover it, of those
-/// that hide each other one.
+/// What the definitions allow at each pixel: the colours, and the number of polygons that cover it. Polygons
+/// that hide each other count as one.
 struct Expected {
     colours: Vec<Vec<u8>>,
     covered: Vec<u8>,
@@ -44,7 +44,7 @@ impl fmt::Debug for Expected {
     }
 }
 
-/// The colours that `texture` has where `drawn` is seen through the centre of (x, y).
+/// The colours of `texture` that the definition allows for the face `drawn` at the centre of (x, y).
 fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i32) -> Vec<u8> {
     let (width, height) = (texture.width(), texture.height());
     let (columns, rows) = match mapper {
@@ -67,7 +67,7 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
             (u.texels(AFFINE_BITS, width), v.texels(AFFINE_BITS, height))
         }
     };
-    // A tiled texture has the texels of its tile alone.
+    // A tiled texture stores only the texels of its tile.
     let (across, down) = texture.tile().unwrap_or((width, height));
     let texel = |i: u16, j: u16| {
         let (i, j) = (i % across, j % down);
@@ -101,7 +101,7 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
             focal_length: FOCAL_LENGTH,
         };
         let points: Vec<Point> = polygon.iter().map(|&vertex| vertex.into()).collect();
-        // Every pixel whose centre may be inside, and one more around.
+        // Every pixel whose centre may be inside, and a margin around them.
         let span = |of: fn(&Point) -> i32, end: usize| {
             let least = points.iter().map(of).min().unwrap_or(0) / 256 - 2;
             let most = points.iter().map(of).max().unwrap_or(0) / 256 + 2;
@@ -123,7 +123,7 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
     expected
 }
 
-/// Compares a picture's pixels with what is expected; how many there were in all.
+/// Compares a frame's pixels with the expected ones.
 fn compare(name: &str, expected: &Expected, pixel: impl Fn(usize) -> u8) {
     for (i, (allowed, covered)) in expected.colours.iter().zip(&expected.covered).enumerate() {
         let (x, y) = (i % WIDTH, i / WIDTH);
@@ -139,7 +139,7 @@ fn compare(name: &str, expected: &Expected, pixel: impl Fn(usize) -> u8) {
     }
 }
 
-/// Compares which pixels are the background's; the texels are another test's to judge.
+/// Compares only which pixels show the background; another test checks the texels.
 fn compare_coverage(
     name: &str,
     expected: &Expected,
@@ -170,13 +170,13 @@ fn every_golden_is_what_the_oracle_draws() {
         let mut texels = Box::new([0; MAX_TEXELS]);
         stage.set(entry.scene(&entry.paint(&mut texels)));
         let pose = pose(&golden);
-        // The committed picture.
+        // The committed PNG.
         let picture = golden.picture().unwrap().expect("it was blessed");
         let affine = expected(&mut stage, &pose, Mapper::default());
         let mapper = golden.look.mapper.unwrap_or_default();
         let background = stage.background();
         match mapper {
-            // Its fractions are shorter.
+            // This loop's fractions are shorter.
             Mapper::Affine(Loop::Packed) => {
                 compare_coverage(&golden.name, &affine, background, |i| picture.pixels[i]);
             }
@@ -188,7 +188,7 @@ fn every_golden_is_what_the_oracle_draws() {
             .iter()
             .filter(|allowed| allowed.len() > 1)
             .count();
-        // The same by the exact mapper, where every texel is the one.
+        // The same frame by the exact mapper, for which only one texel is right.
         let exact = expected(&mut stage, &pose, Mapper::Exact);
         let mut page = Box::new(PlanarBuffer::new());
         page.clear(background);
@@ -202,9 +202,9 @@ fn every_golden_is_what_the_oracle_draws() {
     println!("{between} pixels so near to a texel's border that affine columns may read either");
 }
 
-/// The second oracle knows nothing of snapping: a ray meets a face if it passes each of its edges
-/// on the same side, which is the sign of an exact determinant in the viewer's space, and beyond the
-/// near plane. No pixel further than 1/128 from a true edge may change sides.
+/// The second oracle does not know about snapping: a ray meets a face if it passes each of its edges on the
+/// same side, which is the sign of an exact determinant in view space, and meets it beyond the near plane. No
+/// pixel further than 1/128 pixel from a true edge may change sides.
 #[test]
 fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     let mut random = seeded::generator();
@@ -227,7 +227,7 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     }
     let mut near = Compared::default();
     for _ in 0..seeded::cases(60) {
-        // Within an eighth of a unit above or below a vertex, half of them nearer than the near plane.
+        // Within 1/512 or 1/8 unit of a vertex along each axis; the near plane is at 1/512 unit.
         let reach = random.choice([128, 1 << 13]).unwrap();
         let vertex = ball.vertices[random.usize(..ball.vertices.len())];
         let eye = vertex.map(|k| k + random.i32(-reach..=reach));

@@ -1,7 +1,7 @@
-//! The tests that boot a machine, all in one program: it is linked once, sets up once, and keeps two
-//! cores busy, since libtest runs as many tests at a time as there are cores.
+//! The tests that boot a machine, all in one program: it is linked once, runs the set-up once, and uses all
+//! cores, since libtest runs as many tests at a time as the host has cores.
 //!
-//! `cargo test --test qemu golden::` runs those of one module.
+//! `cargo test --test qemu golden::` runs the tests of one module.
 
 mod boot;
 mod figures;

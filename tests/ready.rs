@@ -6,16 +6,16 @@ use std::sync::LazyLock;
 use qemu::Config;
 use setup::{Options, Ready};
 
-/// What every boot needs.
+/// The result of the set-up, which every boot needs.
 pub static READY: LazyLock<Ready> = LazyLock::new(|| with(&Options::default()));
 
-/// The set-up with these options.
+/// Runs the set-up with these options.
 ///
-/// Where it fails, no test of this program can pass, so the program ends at once: the reason is then
-/// the last thing on the screen, and not one of fifty failures.
+/// If the set-up fails, no test of this program can pass, so the program ends at once. Its reason is then the
+/// last line on the screen, instead of one of fifty failures.
 pub fn with(options: &Options) -> Ready {
     setup::ready(options).unwrap_or_else(|error| {
-        // Not by `eprintln!`, which libtest keeps until the test has ended.
+        // Not with `eprintln!`, whose output libtest keeps until the test has ended.
         let _ = writeln!(
             std::io::stderr(),
             "\n\nerror: these tests boot a machine, and the set-up for that failed: {error:#}\n\n\

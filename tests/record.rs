@@ -1,4 +1,4 @@
-//! `record` and `replay` from the outside: real QEMU, the files that come out.
+//! `record` and `replay` from the outside: real QEMU, and the resulting files.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use vga::widen;
 
 use crate::ready::READY;
 
-/// The program's exit code, standard output and standard error.
+/// Runs the program; returns its exit code, standard output and standard error.
 fn crystal_ball(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     LazyLock::force(&READY);
     let mut program = Command::new(env!("CARGO_BIN_EXE_crystal-ball"));
@@ -28,7 +28,7 @@ fn crystal_ball(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Stri
     )
 }
 
-/// The one picture of a PNG.
+/// The only image of a PNG.
 fn picture(path: &Path) -> Indexed {
     match Subject::read(path).unwrap() {
         Subject::Picture(picture) => picture,
@@ -89,7 +89,7 @@ fn a_recording_has_the_emulated_cards_frames_and_the_same_bytes_each_time() {
         assert_eq!(shown, expected.pixels, "{name}");
     }
 
-    // Six dumps and their PNGs are six pictures, each with its name below.
+    // Six dumps with their PNGs give six images, each with its name below it.
     let (code, told, errors) =
         crystal_ball(folder.path(), &["replay", "own", "--sheet", "sheet.png"]);
     assert_eq!((code, told.as_str()), (Some(0), "sheet.png\n"), "{errors}");

@@ -1,9 +1,10 @@
-//! The set-up from the outside, good and bad cases, in worlds of our own: a process with its own cache, home,
-//! target folder and `PATH`, where small shell scripts stand in for rustup, apt-get, cargo and QEMU. So nothing
-//! of the user's is touched, a whole set-up takes a quarter of a second, and failures can be had at will.
+//! The set-up from the outside, good and bad cases, in isolated worlds: a process with its own cache, home,
+//! target folder and `PATH`, where small shell scripts stand in for rustup, apt-get, cargo and QEMU. So the
+//! tests touch nothing of the user's, a whole set-up lasts a quarter of a second, and failures can be
+//! provoked at will.
 //!
-//! The real ways (packages from the archive, compilers, minutes of building) are the same code: the first
-//! `cargo test` on a new machine goes them, and `real_set_up_recovers_from_kills`, by hand:
+//! The real steps (packages from the archive, compilers, minutes of building) use the same code. The first
+//! `cargo test` on a new machine runs them, and so does `real_set_up_recovers_from_kills`, by hand:
 //! `cargo test --test setup -- --ignored real`.
 
 use std::env;
@@ -20,16 +21,16 @@ use setup::Options;
 use system::Interrupted;
 use tempfile::TempDir;
 
-/// Names what the process of [`in_a_world`] shall do.
+/// The variable that names the action of the process of [`in_a_world`].
 const DO: &str = "CRYSTAL_BALL_TEST_DO";
 
-/// What the scripts may call, beside each other.
+/// The tools that the scripts may call.
 const TOOLS: [&str; 13] = [
     "sh", "setpriv", "mkdir", "cp", "cat", "sleep", "chmod", "mv", "rm", "date", "touch", "ln",
     "env",
 ];
 
-/// Writes a complete toolchain, slowly, and with its end last.
+/// Writes a complete toolchain, slowly, and its last files at the end.
 const TOOLCHAIN: &str = r#"
 toolchain() {
     tools=$1/lib/rustlib/x86_64-unknown-linux-gnu/bin
@@ -48,7 +49,7 @@ echo got >>$HOME/rustup.log
 toolchain $RUSTUP_HOME/toolchains/1.96.0-x86_64-unknown-linux-gnu
 "#;
 
-/// Builds whatever is asked for, slowly.
+/// Builds the requested target, slowly.
 const CARGO: &str = r#"
 case $* in
 */boot/image/*)
@@ -75,12 +76,12 @@ esac
 /// A place where a set-up can run and change nothing else.
 struct World {
     folder: TempDir,
-    /// With this machine's programs and the user's environment: only the cache and the target are apart.
+    /// Uses this machine's programs and the user's environment: only the cache and the target are separate.
     real: bool,
 }
 
 impl World {
-    /// Cargo, rustup and QEMU work; there is no apt-get.
+    /// A world where cargo, rustup and QEMU work; apt-get is missing.
     fn new() -> Self {
         let world = Self::empty(false);
         fs::create_dir(world.path("bin")).unwrap();
@@ -96,7 +97,8 @@ impl World {
         world
     }
 
-    /// No programs; this test's own program, as if it had been built in the world's target folder.
+    /// A world without programs, except this test's program in the target folder, as if it had been built
+    /// there.
     fn empty(real: bool) -> Self {
         let world = Self {
             folder: tempfile::tempdir().unwrap(),
@@ -126,7 +128,7 @@ impl World {
         write_program(&self.path("bin").join(name), script);
     }
 
-    /// An archive with a QEMU, and a system that has one of the libraries that QEMU needs.
+    /// Adds an archive with a QEMU, and a system that has one of the libraries that QEMU needs.
     fn debian_with_qemu(&self) {
         let apt = r#"
 echo "$*" >>$HOME/apt.log
@@ -172,7 +174,7 @@ esac"#;
         command.args(["--exact", "in_a_world", "--ignored", "--nocapture"]);
         if !self.real {
             command.env_clear().env("HOME", self.path("home"));
-            // Not below the user's home, where cargo's settings may be.
+            // Not below the user's home, where settings of cargo may be.
             command.current_dir(self.path("home"));
             command
                 .env("TMPDIR", self.path("tmp"))
@@ -193,7 +195,7 @@ esac"#;
         Said::from(self.command(what).output().unwrap())
     }
 
-    /// Everything is in place, and nothing beside it.
+    /// Checks that everything is in place, and nothing else.
     fn is_whole(&self) {
         assert_eq!(
             fs::read_to_string(self.image()).unwrap(),
@@ -213,8 +215,8 @@ esac"#;
 }
 
 fn write_program(path: &Path, script: &str) {
-    // Written by another process: a test that starts a program at this moment would inherit an open file, and
-    // starting the script would fail ("text file busy").
+    // Another process writes the file. A test that starts a program at this moment would inherit the open
+    // file, and starting the script would fail ("text file busy").
     let mut copy = Command::new("sh");
     copy.args([
         "-c",
@@ -234,7 +236,7 @@ fn entries(folder: &Path) -> usize {
     fs::read_dir(folder).unwrap().count()
 }
 
-/// How a set-up ended, and its words.
+/// The exit code and the messages of a set-up.
 #[derive(Debug)]
 struct Said {
     code: Option<i32>,
@@ -257,7 +259,7 @@ impl Said {
         self
     }
 
-    /// It failed, with all these words.
+    /// Checks that it failed with all these words.
     #[track_caller]
     fn badly(self, words: &[&str]) -> Self {
         assert_eq!(self.code, Some(1), "{}", self.text);
@@ -394,7 +396,7 @@ fn damaged_cache_is_made_again() {
 #[test]
 fn set_ups_wait_for_each_other() {
     let world = World::new();
-    // Slow enough that the second one says that it waits.
+    // Slow enough that the second set-up reports that it waits.
     world.program("cargo", &format!("sleep 1\n{CARGO}"));
     let both: Vec<_> = (0..2)
         .map(|_| world.command("ready").spawn().unwrap())
@@ -520,7 +522,7 @@ echo got >>$HOME/rustup.log; exit 1"#;
     world.does("image").well();
     assert!(!world.cache("toolchain-1.96.0").exists());
     assert!(!world.path("home/rustup.log").exists());
-    // Without its sources it is not complete, and something else is tried.
+    // Without its sources the toolchain is incomplete, and the set-up tries the next source.
     fs::remove_dir_all(world.path("home/own/lib/rustlib/src")).unwrap();
     world.does("image").badly(&["- rustup: "]);
     assert!(world.path("home/rustup.log").exists());
@@ -538,7 +540,7 @@ fn cache_that_cannot_be_written_is_named() {
     Said::from(run).badly(&["file/crystal-ball cannot be used", "XDG_CACHE_HOME"]);
 }
 
-/// Debian without rustup: `answers` is what apt-get does when asked for URIs, or to download.
+/// Debian without rustup: `answers` is apt-get's script for URIs and downloads.
 fn debian(answers: &str) -> World {
     let world = World::new();
     world.remove("rustup");
@@ -621,7 +623,7 @@ echo "host: x86_64-unknown-linux-gnu"; echo "release: 1.96.0"' >$3/usr/bin/rustc
     let asked = apt();
     assert!(!asked.contains("update"), "the system's lists do:\n{asked}");
 
-    // Without the network, and without the archive, which drops old versions: from the packages kept.
+    // Without the network and without the archive, which drops old versions: uses the kept packages.
     fs::remove_dir_all(world.cache("toolchain-1.96.0")).unwrap();
     let offline = || {
         Said::from(
@@ -635,7 +637,7 @@ echo "host: x86_64-unknown-linux-gnu"; echo "release: 1.96.0"' >$3/usr/bin/rustc
     offline().well().not_saying("downloading");
     assert_eq!(apt(), asked);
 
-    // A damaged one is fetched again, it alone.
+    // Only a damaged package is fetched again.
     let damaged = "lld-22_22_all.deb";
     fs::write(world.cache("packages-1.96.0").join(damaged), "hell").unwrap();
     fs::remove_dir_all(world.cache("toolchain-1.96.0")).unwrap();
@@ -663,8 +665,8 @@ fn failing_download_keeps_what_is_whole() {
     assert_eq!(entries(&world.cache("aside")), 0);
 }
 
-/// The real cargo says which settings it finds where the nested builds run, and where `cargo install` looks for
-/// them: in its home and above.
+/// The real cargo reports the settings that it finds where the nested builds run, and where `cargo install`
+/// looks for them: in its home and above.
 #[test]
 fn users_cargo_settings_do_not_reach_the_builds() {
     const HOSTILE: &str = r#"
@@ -696,7 +698,7 @@ case $* in */boot/image/*) (cd $CARGO_HOME/registry; config) >>$HOME/settings.lo
         env!("CARGO")
     );
     world.program("cargo", &cargo);
-    // Above the clone, which is the current folder, and above the cache; and in cargo's home.
+    // Above the clone, which is the current folder; above the cache; and in cargo's home.
     for folder in [".cargo", "home/.cargo"] {
         fs::create_dir(world.path(folder)).unwrap();
         fs::write(world.path(folder).join("config.toml"), HOSTILE).unwrap();
@@ -761,17 +763,17 @@ fn missing_qemu_is_unpacked_into_the_cache() {
     let asked = || fs::read_to_string(world.path("home/apt.log")).unwrap();
     let downloaded = |line: &&str| line.contains(" download ") && line.contains("libsame");
     assert_eq!(asked().lines().find(downloaded), None, "the system has it");
-    // It is planned and downloaded, and nothing is installed.
+    // The installation is planned and downloaded, but not carried out.
     let installs = |line: &&str| line.contains(" install ") && !line.contains("--print-uris");
     assert_eq!(asked().lines().find(installs), None);
 
-    // It no longer starts: a library of the system is gone. It is unpacked again.
+    // QEMU no longer starts, since a library of the system is gone; it is unpacked again.
     write_program(&world.cache("qemu/usr/bin/qemu-system-x86_64"), "exit 127");
     world
         .does("qemu")
         .well()
         .saying(&["the kept QEMU is not used", "unpacking QEMU"]);
-    // Without the network one that is kept will do.
+    // Without the network, a kept QEMU is good enough.
     let offline = |what| {
         let mut command = world.command(what);
         Said::from(command.env("CARGO_NET_OFFLINE", "1").output().unwrap())
@@ -780,7 +782,7 @@ fn missing_qemu_is_unpacked_into_the_cache() {
     offline("window")
         .well()
         .saying(&["cannot open a window", "offline"]);
-    // One with a window takes the place of the other.
+    // A QEMU with a window replaces the other.
     world
         .does("window")
         .well()
@@ -870,8 +872,8 @@ fn children_and_their_children_die_with_the_set_up() {
     }
 }
 
-/// With the compiler and the builds of this machine: a quarter of an hour. What one run has finished the next
-/// one finds, so each of these moments is in another step: download, unpacking, boot loader, kernel.
+/// Uses the compiler and the builds of this machine: a quarter of an hour. Each run finds what the previous
+/// run has finished, so each of these moments is in another step: download, unpacking, boot loader, kernel.
 #[test]
 #[ignore = "downloads the compiler and builds the boot loader, several times"]
 fn real_set_up_recovers_from_kills() {
@@ -892,7 +894,7 @@ fn real_set_up_recovers_from_kills() {
     assert_eq!(entries(&world.cache("aside")), 0);
 }
 
-/// Kills a set-up at ten moments of its life, each time in a new world; each time the next run must end well.
+/// Kills a set-up at ten moments, each time in a new world; each time the next run must succeed.
 #[test]
 fn set_up_recovers_from_kills() {
     let reference = World::new();

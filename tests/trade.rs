@@ -1,4 +1,4 @@
-//! `trade` from the outside: what it refuses, how, and what it leaves.
+//! `trade` from the outside: what it refuses, its messages, and the files that it leaves.
 
 use std::process::{Command, Output, Stdio};
 
@@ -11,7 +11,7 @@ fn trade(arguments: &[&str]) -> Output {
         .expect("the program can be started")
 }
 
-/// What a debug build would measure is its own checks.
+/// A debug build would measure its own checks.
 #[cfg(debug_assertions)]
 #[test]
 fn a_debug_build_refuses_and_says_what_to_do() {
@@ -24,7 +24,7 @@ fn a_debug_build_refuses_and_says_what_to_do() {
     assert!(said.stdout.is_empty() && !out.exists());
 }
 
-/// With `cargo test --release`: one scene, two mappers, and nothing but whole files.
+/// With `cargo test --release`: one scene, two mappers, and only complete files.
 #[cfg(not(debug_assertions))]
 #[test]
 fn a_release_build_measures_what_it_is_asked_for() {

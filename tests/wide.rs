@@ -1,8 +1,8 @@
-//! The wide set, by `cargo wide`: what the image does on each QEMU, in configurations of adapter,
-//! chipset, memory, CPU and disk.
+//! The wide set, by `cargo wide`: checks the image on each QEMU, in configurations of adapter, chipset,
+//! memory, CPU and disk.
 //!
-//! `CRYSTAL_BALL_QEMUS` lists the programs, separated as in `PATH`; without it the installed QEMU
-//! is the only one.
+//! `CRYSTAL_BALL_QEMUS` lists the programs, separated as in `PATH`; without it only the installed QEMU is
+//! checked.
 
 use std::path::PathBuf;
 use std::thread;
@@ -14,11 +14,11 @@ use setup::{Options, Ready};
 use crate::golden::{agrees, emulated_evidence, evidence, few, goldens, with_arguments};
 use crate::ready;
 
-/// Boots in a row, and at once.
+/// Boots one after the other, and boots at once.
 const BOOTS: usize = 100;
 const AT_ONCE: usize = 8;
 
-/// What a configuration is expected to do.
+/// A configuration's expected result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Expected {
     /// All goldens are equal.
@@ -27,10 +27,10 @@ enum Expected {
     End(u8),
 }
 
-/// A configuration, its `-vga` first.
+/// A configuration: the argument of `-vga`, and the other arguments.
 type Configuration = (&'static str, String);
 
-/// Those that are checked with every golden.
+/// Configurations that are checked with every golden.
 fn configurations(ready: &Ready) -> Vec<Configuration> {
     let mut all: Vec<Configuration> = [
         ("std,retrace=precise", ""),
@@ -57,7 +57,7 @@ fn configurations(ready: &Ready) -> Vec<Configuration> {
             all.push((vga, format!("-machine {machine}")));
         }
     }
-    // As on a PC without virtio, a disk that is read through ports.
+    // A disk that is read through ports, as on a PC without virtio.
     let image = ready.image.display();
     all.push((
         "std",
@@ -69,7 +69,7 @@ fn configurations(ready: &Ready) -> Vec<Configuration> {
     all
 }
 
-/// Those that are checked with a few goldens: each adapter and chipset with little and much memory.
+/// Configurations that are checked with a few goldens: each adapter and chipset with little and much memory.
 fn memories() -> Vec<Configuration> {
     let mut all = Vec::new();
     for vga in ["std", "cirrus", "vmware", "virtio"] {
@@ -106,7 +106,7 @@ fn expectations_know_the_versions() {
     }
 }
 
-/// A row of the table: the QEMU's version, and the counts of what was as expected.
+/// A row of the table: the QEMU's version, and how many results were as expected.
 struct Row {
     version: String,
     equal: usize,
@@ -158,7 +158,7 @@ fn on(ready: &Ready) -> Row {
     row
 }
 
-/// Boots one by one and at once. All of them must draw the same.
+/// Boots one after the other and at once. All boots must draw the same bytes.
 fn boots(ready: &Ready, done: &mut usize) -> anyhow::Result<()> {
     let plain = with_arguments(ready, "std", "");
     let expected = emulated_evidence();

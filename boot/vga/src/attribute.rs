@@ -1,13 +1,13 @@
-//! The attribute controller: index and data by turns through one port.
+//! The attribute controller: index and data alternate on one port.
 
 use crate::fault::Complaint;
 
-/// Address bit 5, PAS: 0 opens the palette registers and blanks the picture.
+/// Address bit 5, PAS: 0 opens the palette registers and blanks the screen.
 const PALETTE_ADDRESS_SOURCE: u8 = 0x20;
 
 /// AR10: graphics, 256 colours.
 const MODE_CONTROL: u8 = 0x10;
-/// AR12: all four planes shown.
+/// AR12: all four planes displayed.
 const COLOUR_PLANE_ENABLE: u8 = 0x12;
 
 /// AR0 to AR14, and the flip-flop between index and data.
@@ -16,7 +16,7 @@ pub(crate) struct Attribute {
     registers: [Option<u8>; 21],
     /// The address register: index, and PAS in bit 5.
     address: Option<u8>,
-    /// What the next write is; nothing is known before Input Status 1 was read.
+    /// Whether the next write is data; unknown before the first read of Input Status 1.
     expects_data: Option<bool>,
 }
 
@@ -59,7 +59,7 @@ impl Attribute {
         };
         *register = Some(value);
         let used = match index {
-            // In 256 colours anything but identity garbles them.
+            // In 256 colours anything but identity garbles the colours.
             0..=0x0F => index,
             MODE_CONTROL => 0x41,
             COLOUR_PLANE_ENABLE => 0x0F,
@@ -72,7 +72,7 @@ impl Attribute {
         }
     }
 
-    /// What blanks or garbles the picture; wrong values here still look right in QEMU.
+    /// Reports what blanks or garbles the image. QEMU's image looks right even with wrong values here.
     pub fn check_picture(&self, graphics: bool) -> Result<(), Complaint> {
         if let Some(i) = self.registers.iter().position(Option::is_none) {
             return Err(("register was never written", format!("AR{i:02X}")));
@@ -91,8 +91,7 @@ impl Attribute {
         Ok(())
     }
 
-    /// An index of the picture as it goes on to the DAC: each nibble through the palette
-    /// registers.
+    /// The index that goes to the DAC for a pixel: each nibble passes through the palette registers.
     pub fn colour(&self, pixel: u8) -> u8 {
         let nibble = |n: u8| self.registers[usize::from(n)].unwrap_or(0) & 0x0F;
         nibble(pixel >> 4) << 4 | nibble(pixel & 0x0F)

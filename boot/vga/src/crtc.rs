@@ -1,4 +1,4 @@
-//! The CRT controller: geometry, start address, and where the beam is.
+//! The CRT controller: geometry, start address, and the beam's position.
 
 use crate::fault::Complaint;
 use crate::monitor::Timing;
@@ -10,7 +10,7 @@ const VERTICAL_RETRACE_END: u8 = 0x11;
 /// CR11 bit 7: CR0 to CR7 are protected.
 const PROTECT: u8 = 0x80;
 
-/// Bits that decide no time: index, mask, the value that Mode X needs, and what they are for. Values
+/// Bits that affect no timing: index, mask, the value that Mode X needs, and the bits' purpose. The values
 /// are those of FreeVGA's pages for a mode without text, and of the BIOS's 256-colour mode.
 #[rustfmt::skip]
 const PLAIN: &[(u8, u8, u8, &str)] = &[
@@ -31,10 +31,10 @@ const PLAIN: &[(u8, u8, u8, &str)] = &[
     (0x17, 0x03, 0x03, "no address bit comes from the line counter"),
 ];
 
-/// When the CRTC takes a new start address over. Cards differ; a program must be right with each.
+/// When the CRTC latches a new start address. Cards differ; a program must be correct with each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Latch {
-    /// When the last line was shown.
+    /// After the last displayed line.
     DisplayEnd,
     /// When the vertical retrace begins, as FreeVGA says.
     #[default]
@@ -48,17 +48,17 @@ pub enum Latch {
 pub(crate) struct Crtc {
     pub index: Option<u8>,
     registers: [Option<u8>; 25],
-    /// What they amount to, once all are known.
+    /// The timing that the registers give, once all are known.
     timing: Option<Timing>,
     latch: Latch,
-    /// Character clocks to the next take-over of the start address, 1 to a frame: that is where the
-    /// beam is. Each access moves it, so this is kept and not the beam's own place.
+    /// Character clocks until the start address is next latched: 1 to a whole frame. This count stands for
+    /// the beam's position. Each access moves the beam, and the count is cheaper to update.
     ahead: usize,
-    /// Start addresses taken over.
+    /// Number of times that the start address was latched.
     pub frames: u64,
-    /// The start address that was taken over last.
+    /// The start address that was latched last.
     latched: Option<u16>,
-    /// Which half of the start address was changed in which frame, and not taken over whole.
+    /// For each half of the start address, the frame in which a write last changed it.
     changed: [Option<u64>; 2],
 }
 
@@ -67,13 +67,13 @@ impl Crtc {
         *self.registers.get(usize::from(index))?
     }
 
-    /// Returns every fault of the write. The times are checked as soon as all registers are known,
-    /// and from then on at each write to one that decides them.
+    /// Returns every fault of the write. The timing is checked as soon as all registers are known, and from
+    /// then on at each write to a register that affects it.
     pub fn write(&mut self, index: u8, value: u8) -> Vec<Complaint> {
         let Some(register) = self.registers.get(usize::from(index)) else {
             return vec![("unused register", format!("CR{index:02X}"))];
         };
-        // Before it was written the protection is as the BIOS leaves it: on.
+        // While CR11 is unknown, the protection is on, as the BIOS leaves it.
         let end = self.registers[usize::from(VERTICAL_RETRACE_END)];
         let protected = end.is_none_or(|end| end & PROTECT != 0);
         if index <= 7 && protected {
@@ -111,7 +111,7 @@ impl Crtc {
         complaints
     }
 
-    /// Computes the times once all registers are known. The beam stays where it is.
+    /// Computes the timing once all registers are known. The beam stays where it is.
     fn complete(&mut self) {
         if self.registers.iter().all(Option::is_some) {
             let beam = self.timing.as_ref().map_or(0, |timing| self.beam(timing));
@@ -121,7 +121,7 @@ impl Crtc {
         }
     }
 
-    /// Sets when a start address is taken over.
+    /// Sets when a start address is latched.
     pub fn set_latch(&mut self, latch: Latch) {
         if let Some(timing) = &self.timing {
             self.ahead = latch.ahead(timing, self.beam(timing));
@@ -141,7 +141,7 @@ impl Crtc {
         Ok(())
     }
 
-    /// The start address as it is written.
+    /// The start address in the registers.
     pub fn start_address(&self) -> Option<u16> {
         let half = |index: u8| self.registers[usize::from(index)];
         Some(u16::from_be_bytes([
@@ -150,18 +150,18 @@ impl Crtc {
         ]))
     }
 
-    /// The start address that was taken over last.
+    /// The start address that was latched last.
     pub fn shown_address(&self) -> Option<u16> {
         self.latched
     }
 
-    /// The start addresses of pages that will still be seen, if no further one is written: of the
-    /// frame that is being shown, and of those after it.
+    /// The start addresses of pages that will still be displayed if no further address is written: in the
+    /// current frame, and in the frames after it.
     pub fn seen(&self) -> [Option<u16>; 2] {
         let Some(timing) = &self.timing else {
             return [None; 2];
         };
-        // Between the last line and the take-over nothing more is shown of the old page.
+        // Between the last displayed line and the latch, no more of the old page is displayed.
         let dark = self.latch.line(timing).saturating_sub(timing.down.shown);
         let dark = dark * timing.across.total;
         let old = self.latched.filter(|_| self.ahead > dark);
@@ -174,7 +174,7 @@ impl Crtc {
         (latch + timing.frame() - self.ahead) % timing.frame()
     }
 
-    /// Moves the beam. Before all registers are known there is none.
+    /// Moves the beam. It does not move before all registers are known.
     pub fn advance(&mut self, clocks: usize) {
         let Some(timing) = &self.timing else { return };
         if clocks < self.ahead {
@@ -187,7 +187,7 @@ impl Crtc {
         self.latched = self.start_address();
     }
 
-    /// Character clocks to the next take-over of the start address.
+    /// Character clocks until the start address is next latched.
     pub fn to_take_over(&self) -> Option<usize> {
         self.timing.as_ref().map(|_| self.ahead)
     }
@@ -195,7 +195,7 @@ impl Crtc {
     /// Input Status 1.
     pub fn status(&self) -> u8 {
         let Some(timing) = &self.timing else {
-            // The attribute controller may be reached before the CRTC is set.
+            // A program may reach the attribute controller before it sets the CRTC.
             return DISPLAY_DISABLED;
         };
         let beam = self.beam(timing);
@@ -206,7 +206,7 @@ impl Crtc {
         bit(retrace, VERTICAL_RETRACE) | bit(blank, DISPLAY_DISABLED)
     }
 
-    /// The times that the registers make.
+    /// The timing that the registers give.
     pub fn timing(&self) -> Result<&Timing, Complaint> {
         self.timing.as_ref().ok_or_else(|| {
             let unknown = self.registers.iter().position(Option::is_none);
@@ -217,7 +217,7 @@ impl Crtc {
 }
 
 impl Latch {
-    /// The scan line at whose begin a start address is taken over, modulo the lines of a frame.
+    /// The scan line at whose start the address is latched, modulo the lines of a frame.
     fn line(self, timing: &Timing) -> usize {
         match self {
             Self::DisplayEnd => timing.down.shown,
@@ -226,10 +226,10 @@ impl Latch {
         }
     }
 
-    /// Character clocks from a place of the beam to the take-over, 1 to a frame.
+    /// Character clocks from a position of the beam to the latch: 1 to a whole frame.
     fn ahead(self, timing: &Timing, beam: usize) -> usize {
         let (latch, frame) = (self.line(timing) * timing.across.total, timing.frame());
-        // Registers that were changed under the beam may have made the frame shorter.
+        // A register that changed during the frame may have made the frame shorter.
         (latch % frame + frame - 1 - beam % frame) % frame + 1
     }
 }

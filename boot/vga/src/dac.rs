@@ -1,4 +1,4 @@
-//! The DAC: 256 colours of 6 bits each.
+//! The DAC: 256 colours of 6 bits for each of red, green and blue.
 
 use crate::fault::Complaint;
 
@@ -9,12 +9,12 @@ pub fn widen(part: u8) -> u8 {
     (part << 2) | ((part & 1) * 3)
 }
 
-/// The colours, and where the next part of one goes.
+/// The colours, and the position of the next write or read.
 #[derive(Clone, Debug)]
 pub(crate) struct Dac {
     colours: [[Option<u8>; 3]; 256],
     pel_mask: Option<u8>,
-    /// Entry and part of the next data write; the chip has one address for both ways.
+    /// Entry and part of the next data write. The chip has one address for writing and reading.
     write: Option<(u8, usize)>,
     /// Entry and part of the next data read.
     read: Option<(u8, usize)>,
@@ -78,7 +78,7 @@ impl Dac {
         }
     }
 
-    /// The colour behind an index, as the monitor gets it.
+    /// The colour that the monitor gets for an index.
     pub fn colour(&self, index: u8) -> Result<[u8; 3], Complaint> {
         let Some(mask) = self.pel_mask else {
             return Err(("register was never written", "PEL Mask".into()));
@@ -93,7 +93,7 @@ impl Dac {
     }
 }
 
-/// The address steps after the third part.
+/// The entry and part after this one: the entry advances after the third part.
 fn next(entry: u8, part: usize) -> (u8, usize) {
     match part {
         2 => (entry.wrapping_add(1), 0),

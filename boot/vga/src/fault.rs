@@ -1,4 +1,4 @@
-//! What went wrong, by which access, in which state.
+//! Faults: what is wrong, the access that caused it, and the state.
 
 use std::fmt;
 
@@ -17,7 +17,7 @@ pub enum Access {
     Store(u16, u8),
     /// A byte read from the window.
     Load(u16),
-    /// No access: the picture was looked at.
+    /// No access: the screen was examined.
     ScanOut,
 }
 
@@ -35,14 +35,14 @@ impl fmt::Display for Access {
     }
 }
 
-/// An access that a card would not take as it was meant, or that no scene makes.
+/// An access that real hardware would not perform as intended, or that no scene makes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// Its name, for tests and people: fixed words.
+    /// The fault's name, for tests and people: fixed words.
     pub name: &'static str,
     /// The access that caused it.
     pub access: Access,
-    /// What made it wrong.
+    /// The state that made the access wrong.
     pub state: String,
 }
 
@@ -52,5 +52,5 @@ impl fmt::Display for Fault {
     }
 }
 
-/// What a block says of an access: a fault's name and the state behind it.
+/// A block's complaint about an access: the fault's name and its state.
 pub(crate) type Complaint = (&'static str, String);

@@ -1,4 +1,4 @@
-//! The graphics controller: how stores and loads go through the latches.
+//! The graphics controller: how stores and loads pass through the latches.
 
 use crate::fault::Complaint;
 
@@ -25,7 +25,7 @@ impl Graphics {
         let used: &[u8] = match index {
             // Read Map.
             4 => &[0, 1, 2, 3],
-            // Mode: 256-colour shift, write mode 0, read mode 0. Plain 00 would break the shift.
+            // Mode: 256-colour shift, write mode 0, read mode 0. A value of 00 would turn the shift off.
             5 => &[0x40],
             6 => &[WINDOW],
             // Colour Don't Care: for a read mode that no scene uses.
@@ -47,7 +47,7 @@ impl Graphics {
         self.registers[4].unwrap_or(0)
     }
 
-    /// What keeps a store or load from being a plain byte of the selected planes.
+    /// Reports what prevents a store or load from reaching plain bytes of the selected planes.
     pub fn check_window(&self) -> Result<(), Complaint> {
         let plain = [0, 1, 3, 5, 6, 8];
         match plain.iter().find(|&&i| self.registers[i].is_none()) {
@@ -60,7 +60,7 @@ impl Graphics {
         }
     }
 
-    /// Whether GR6 says graphics, which the attribute controller must say too.
+    /// Whether GR6 selects graphics; the attribute controller must agree.
     pub fn is_graphics(&self) -> bool {
         self.registers[6].is_some_and(|v| v & 1 == 1)
     }

@@ -1,34 +1,35 @@
-//! A VGA on the host, as strict as the card is silent.
+//! A VGA on the host, stricter than real hardware reports.
 //!
-//! It models, block by block, what the project's scenes use and nothing else. QEMU draws a
-//! picture from almost any register values; real cards blank, garble or drop writes. So whatever
-//! hardware would not show as meant is a [`Fault`] here, and so is every register, value, port or
-//! address that no scene uses: a feature comes with the scene that needs it.
+//! It models, block by block, what the project's scenes use and nothing else. QEMU draws an image from almost
+//! any register values; real cards blank, garble or drop writes. So anything that hardware would not show as
+//! intended is a [`Fault`] here. So is every register, value, port or address that no scene uses: a feature
+//! comes with the scene that needs it.
 //!
-//! - `sequencer`, `graphics`, `crtc`, `attribute`, `dac`, `memory`: a file per block
-//!   of the chip, each with its registers and what it makes of them; `monitor`: what the CRTC's
-//!   registers give a monitor, and what it needs;
-//! - [`Vga`]: the card. It decodes ports and the window, and implements [`modex::Bus`], so the
-//!   driver and the renderer run on it as they do on the bare machine;
-//! - [`scanout`]: the picture as the monitor shows it, derived from the registers.
+//! - `sequencer`, `graphics`, `crtc`, `attribute`, `dac`, `memory`: a file for each block of the chip, with
+//!   its registers and their effect;
+//! - `monitor`: the times that the CRTC's registers give a monitor, and the times that it needs;
+//! - [`Vga`]: the whole card. It decodes ports and the window, and implements [`modex::Bus`], so the driver
+//!   and the renderer run on it as they do on the bare machine;
+//! - [`scanout`]: the image that the monitor shows, derived from the registers.
 //!
 //! # Faults
 //!
-//! A fault is noted and the access then does what the chip would do. A card that is dropped with
-//! faults nobody took panics with all of them: a test that causes one fails, asked or not.
+//! A fault is recorded, and the access then does what the chip would do. If a [`Vga`] is dropped while it
+//! holds faults that nobody took, it panics and lists them: a test that causes a fault fails even if it does
+//! not check for faults.
 //!
 //! # Values
 //!
-//! The card has its own port numbers and its own values, from the literature and not from the driver's
-//! table: a mistake in the table is a fault. What the CRTC's registers give is computed from them and
-//! compared with what a monitor needs.
+//! The emulated VGA has its own port numbers and values, from the literature and not from the driver's table:
+//! a mistake in the table is a fault. The times that the CRTC's registers give are computed from the
+//! registers and compared with the times that a monitor needs.
 //!
 //! # Time
 //!
-//! The beam moves with each access, by the time that the access takes on a slow bus, and by
-//! [`Vga::pass`]. A test can have more time pass before any access ([`Vga::set_delay`]), as an
-//! interrupt handler would, and can choose when a new start address is taken over ([`Latch`]). A store
-//! to a page that will still be seen is a fault.
+//! The beam moves with each access, by the time that the access would need on a slow bus, and by
+//! [`Vga::pass`]. A test can let more time pass before any access ([`Vga::set_delay`]), as an interrupt
+//! handler would, and can choose when a new start address is latched ([`Latch`]). A store to a page that will
+//! still be displayed is a fault.
 
 mod attribute;
 mod crtc;

@@ -5,7 +5,7 @@ use crate::ports::PLANE_BYTES;
 
 /// Bytes of a page in each plane.
 pub(crate) const PAGE_BYTES: usize = NEEDED.stride * (NEEDED.down.shown / NEEDED.repeat);
-/// First byte behind the last page of as many as there is room for.
+/// The end of the last page that fits.
 pub(crate) const PAGES_END: usize = PLANE_BYTES / PAGE_BYTES * PAGE_BYTES;
 
 /// Four planes of 64 KiB, and a latch for each.
@@ -16,7 +16,7 @@ pub(crate) struct Memory {
 }
 
 impl Default for Memory {
-    /// Memory holds anything at power-on; this is a pattern that no scene draws.
+    /// Memory contains anything at power-on; this pattern is one that no scene draws.
     fn default() -> Self {
         Self {
             planes: (0..PLANE_BYTES)
@@ -37,13 +37,13 @@ impl Memory {
         }
     }
 
-    /// Read mode 0: every load fills all four latches, and returns one.
+    /// Read mode 0: every load fills all four latches, and returns the selected one.
     pub fn load(&mut self, at: u16, plane: u8) -> u8 {
         self.latches = self.planes[usize::from(at)];
         self.latches[usize::from(plane & 3)]
     }
 
-    /// A byte of a plane, without a latch being filled.
+    /// Returns a byte of a plane without filling a latch.
     pub fn peek(&self, plane: usize, at: u16) -> u8 {
         self.planes[usize::from(at)][plane]
     }
@@ -53,7 +53,8 @@ impl Memory {
 mod tests {
     use super::*;
 
-    /// No scene stores from the latches, so a load returns one, and only here all four are seen.
+    /// No scene stores from the latches, and a load returns only one, so this is the only place that checks
+    /// all four.
     #[test]
     fn every_load_fills_all_four_latches() {
         let mut memory = Memory::default();

@@ -1,13 +1,13 @@
-//! What a monitor needs, and what the registers give it.
+//! The timing that a monitor needs, and the timing that the registers give it.
 //!
-//! The values here are the emulated card's own. The chip's registers give times in the unit of the
-//! chip, character clocks across and scan lines down; [`Timing::of`] computes them, and [`Timing::faults`]
-//! compares them with what a VGA monitor needs for 320x240 ([`NEEDED`]).
+//! The values here are the emulated VGA's own. The registers give times in the chip's units, character clocks
+//! across and scan lines down. [`Timing::of`] computes the times, and [`Timing::faults`] compares them with
+//! those that a VGA monitor needs for 320x240 ([`NEEDED`]).
 //!
-//! Sources: FreeVGA, "CRT Controller Registers" (how registers give times); VESA DMT 1.0, 640x480 at
-//! 60 Hz (what a monitor needs); IBM, "VGA Technical Reference" (which sync polarity is which number
-//! of lines, and the horizontal times of the 640-dot modes); Abrash, "Graphics Programming Black
-//! Book", chapter 47 (the vertical times of 320x240).
+//! Sources: FreeVGA, "CRT Controller Registers" (how registers give times); VESA DMT 1.0, 640x480 at 60 Hz
+//! (what a monitor needs); IBM, "VGA Technical Reference" (which sync polarity stands for which number of
+//! lines, and the horizontal times of the 640-dot modes); Abrash, "Graphics Programming Black Book", chapter
+//! 47 (the vertical times of 320x240).
 
 use std::ops::Range;
 
@@ -22,18 +22,18 @@ pub(crate) struct Axis {
     pub retrace: Range<usize>,
 }
 
-/// What the CRTC's registers amount to.
+/// The timing and layout that the CRTC's registers give.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Timing {
     /// In character clocks.
     pub across: Axis,
     /// In scan lines.
     pub down: Axis,
-    /// Scan lines that each line of the picture takes.
+    /// Scan lines for each line of pixels.
     pub repeat: usize,
-    /// Bytes of a plane from a line to the next.
+    /// Bytes of a plane from one line to the next.
     pub stride: usize,
-    /// The scan line from which on the screen is split.
+    /// The scan line from which the screen is split.
     pub compare: usize,
 }
 
@@ -44,36 +44,36 @@ pub(crate) const NEEDED: Timing = Timing {
         total: 100,
         // 640 dots, two for each pixel.
         shown: 80,
-        // No border on the right: it would have a colour of the palette.
+        // No border on the right: it would show a colour of the palette.
         blank: 80..98,
-        // A sync pulse of 96 dots, 3.8 us. It begins 32 dots after the picture.
+        // A sync pulse of 96 dots, 3.8 us. It begins 32 dots after the display end.
         retrace: 84..96,
     },
     down: Axis {
-        // Two more than 640x480 has: 59.71 Hz for its 59.94.
+        // Two lines more than 640x480: 59.71 Hz instead of 59.94.
         total: 527,
-        // Two for each line of the picture.
+        // Two for each line of pixels.
         shown: 480,
         blank: 487..518,
-        // 10 lines after the picture, 2 lines long: as 640x480.
+        // 10 lines after the display end, 2 lines long, as in 640x480.
         retrace: 490..492,
     },
     repeat: 2,
-    // 320 pixels, a fourth of them in each plane.
+    // 320 pixels, a quarter of them in each plane.
     stride: 80,
-    // No line has this number, in any mode.
+    // No line has this number in any mode.
     compare: 1023,
 };
 
-/// The first number after `start` whose low `bits` bits are those of `end`: the chip compares no
-/// more, so a period is 1 to 2^`bits` long.
+/// The first number after `start` whose low `bits` bits equal those of `end`. The chip compares only these
+/// bits, so a period is 1 to 2^`bits` long.
 fn end(start: usize, end: usize, bits: u32) -> usize {
     let next = start + 1;
     next + (end.wrapping_sub(next) & ((1 << bits) - 1))
 }
 
 impl Timing {
-    /// What `registers`, CR0 to CR18, give.
+    /// The timing that `registers`, CR0 to CR18, give.
     pub fn of(registers: &[u8; 25]) -> Self {
         let register = |index: usize| usize::from(registers[index]);
         let bit = |index: usize, bit: u32, place: u32| (register(index) >> bit & 1) << place;
@@ -85,7 +85,7 @@ impl Timing {
             blank: blank..end(blank, register(0x03) & 0x1F | bit(0x05, 7, 5), 6),
             retrace: retrace..end(retrace, register(0x05), 5),
         };
-        // CR7 has bits 8 and 9 of all vertical positions, but for one that CR9 has.
+        // CR7 has bits 8 and 9 of the vertical positions; CR9 has bit 9 of the blank's start.
         let blank = register(0x15) | bit(0x07, 3, 8) | bit(0x09, 5, 9);
         let retrace = register(0x10) | bit(0x07, 2, 8) | bit(0x07, 7, 9);
         let down = Axis {
@@ -94,7 +94,7 @@ impl Timing {
             blank: blank..end(blank, register(0x16), 8),
             retrace: retrace..end(retrace, register(0x11), 4),
         };
-        // CR14 bit 6: doublewords; CR17 bit 6: bytes, and words otherwise. CR13 counts two of either.
+        // CR14 bit 6: doublewords; CR17 bit 6: bytes, and words otherwise. CR13 counts pairs of these units.
         let unit = match (bit(0x14, 6, 0), bit(0x17, 6, 0)) {
             (1, _) => 4,
             (_, 1) => 1,
@@ -183,7 +183,7 @@ impl Timing {
         ]
     }
 
-    /// The times that are not as a monitor needs them: those that register `index` decides, or all.
+    /// Reports the times that differ from what a monitor needs: those that register `index` affects, or all.
     pub fn faults(&self, index: Option<u8>) -> impl Iterator<Item = Complaint> {
         let pairs = self.named().into_iter().zip(NEEDED.named());
         let of_index = pairs.filter(move |((registers, ..), _)| {
@@ -201,10 +201,10 @@ impl Timing {
     }
 }
 
-/// What is wrong with Miscellaneous Output, as far as a bit of it decides something.
+/// Returns what is wrong with a value of Miscellaneous Output, as far as its bits have an effect.
 pub(crate) fn misc_fault(value: u8) -> Option<&'static str> {
-    // IBM: the polarity of the syncs tells a monitor how many lines fill its screen. Negative is 1;
-    // bit 7 is the vertical one.
+    // IBM: a monitor derives the number of lines from the polarity of the syncs. 1 is negative; bit 7 is the
+    // vertical sync.
     let lines = [None, Some(400), Some(350), Some(480)][usize::from(value >> 6)];
     [
         (value & 0x01 == 0, "bit 0: the CRTC is not at 3D4h"),
@@ -234,12 +234,12 @@ pub(crate) fn misc_fault(value: u8) -> Option<&'static str> {
 mod tests {
     use super::*;
 
-    /// The dot clock that Miscellaneous Output bits 3 and 2 select with 00, in Hz.
+    /// The dot clock for 00 in Miscellaneous Output bits 3 and 2, in Hz.
     const DOT_CLOCK: f64 = 25_175_000.0;
     /// Dots of a character clock, with SR1 bit 0 set.
     const CHARACTER: f64 = 8.0;
 
-    /// The needed times against what they are derived from.
+    /// Checks the needed times against the rates that they are derived from.
     #[test]
     fn the_needed_times_make_a_frame() {
         let Timing { across, down, .. } = NEEDED;
@@ -248,13 +248,13 @@ mod tests {
         let frame_rate = line_rate / down.total as f64;
         assert!((frame_rate - 59.71).abs() < 0.005, "{frame_rate} Hz");
         for axis in [&across, &down] {
-            // The retrace is black, and in the part that is not shown.
+            // The retrace lies in the blank, outside the displayed part.
             assert!(axis.shown <= axis.blank.start);
             assert!(axis.blank.start < axis.retrace.start);
             assert!(axis.retrace.end < axis.blank.end);
             assert!(axis.blank.end <= axis.total);
         }
-        // VESA DMT: a horizontal sync of 96 dots; a vertical one of 2 lines, 10 after the picture.
+        // VESA DMT: a horizontal sync of 96 dots; a vertical sync of 2 lines, 10 lines after the display end.
         assert_eq!(across.retrace.len() * 8, 96);
         assert_eq!(
             (down.retrace.len(), down.retrace.start - down.shown),

@@ -1,5 +1,5 @@
-//! The chip's ports and indices, from the FreeVGA pages and not from the driver: a wrong number in
-//! the driver must not find its twin here.
+//! The chip's ports and indices, from the FreeVGA pages and not from the driver: a wrong number in the driver
+//! must not match the same mistake here.
 
 pub const ATTRIBUTE: u16 = 0x3C0;
 pub const ATTRIBUTE_READ: u16 = 0x3C1;
@@ -15,7 +15,7 @@ pub const GRAPHICS: u16 = 0x3CE;
 pub const CRTC: u16 = 0x3D4;
 pub const INPUT_STATUS_1: u16 = 0x3DA;
 
-/// Bochs DISPI, from Bochs's iodev/display/vga.h: index and data port, and three indices and values.
+/// Bochs DISPI, from Bochs's iodev/display/vga.h: index port and data port, then two indices and a value.
 pub const DISPI_INDEX: u16 = 0x1CE;
 pub const DISPI_DATA: u16 = 0x1CF;
 pub const DISPI_ID: u16 = 0;

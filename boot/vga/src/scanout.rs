@@ -1,4 +1,4 @@
-//! The picture as the monitor shows it.
+//! The image that the monitor shows.
 
 use crate::Vga;
 use crate::fault::Complaint;
@@ -6,7 +6,7 @@ use crate::fault::Complaint;
 /// The page on the screen, in palette indices, each pixel once.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Page {
-    /// The start address that the CRTC has taken over.
+    /// The start address that the CRTC has latched.
     pub start: u16,
     /// Pixels across.
     pub width: usize,
@@ -16,11 +16,11 @@ pub struct Page {
     pub pixels: Vec<u8>,
     /// The DAC's colours, 6 bits each of red, green and blue.
     pub palette: [[u8; 3]; 256],
-    /// Scan lines that each line takes.
+    /// Scan lines for each line of pixels.
     repeat: usize,
 }
 
-/// What a frame shows, a colour for every dot: 640x480 in Mode X, each pixel two by two.
+/// The image on the monitor, a colour for every dot: 640x480 in Mode X, where each pixel is two by two dots.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Picture {
     /// Dots across.
@@ -36,7 +36,7 @@ impl Page {
         card.sequencer.check_picture()?;
         card.attribute.check_picture(card.graphics.is_graphics())?;
         let timing = card.crtc.timing()?;
-        // A pixel of 256 colours takes two of the 8 dots of a character.
+        // A pixel in a 256-colour mode is two of the 8 dots of a character wide.
         let (width, height) = (timing.across.shown * 4, timing.down.shown / timing.repeat);
         let Some(start) = card.crtc.shown_address() else {
             return Err((
@@ -67,9 +67,9 @@ impl Page {
         })
     }
 
-    /// The page as the monitor shows it.
+    /// The image that the monitor shows of this page.
     pub fn scan_out(&self) -> Picture {
-        // A 256-colour pixel takes two dots.
+        // A pixel in a 256-colour mode is two dots wide.
         let width = 2 * self.width;
         let height = self.height * self.repeat;
         let mut dots = Vec::with_capacity(width * height);

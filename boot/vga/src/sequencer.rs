@@ -1,4 +1,4 @@
-//! The sequencer: reset, clocking, and which planes a store reaches.
+//! The sequencer: reset, clocking, and the planes that a store reaches.
 
 use crate::fault::Complaint;
 
@@ -15,7 +15,7 @@ const SYNCHRONOUS_RESET: u8 = 0x01;
 /// SR4: extended memory, odd/even off, chain-4 off (Abrash, chapter 47: "turn off chain-4").
 const UNCHAINED: u8 = 0x06;
 
-/// SR0 to SR4. Nothing is known of a register before it is written.
+/// SR0 to SR4. A register is unknown before its first write.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sequencer {
     pub index: Option<u8>,
@@ -52,7 +52,7 @@ impl Sequencer {
         self.registers[usize::from(RESET)] == Some(SYNCHRONOUS_RESET)
     }
 
-    /// The planes that a store reaches; none while that was never said.
+    /// The planes that a store reaches: no plane before the first write of Map Mask.
     pub fn map_mask(&self) -> u8 {
         self.registers[usize::from(MAP_MASK)].unwrap_or(0)
     }
@@ -61,8 +61,8 @@ impl Sequencer {
         self.registers[usize::from(CLOCKING_MODE)].is_some_and(|v| v & SCREEN_DISABLE == 0)
     }
 
-    /// What keeps the memory from being unchained and four planes wide. With SR4 bit 2 clear
-    /// hardware writes only half the planes; QEMU does not care.
+    /// Reports memory that is not unchained and four planes wide. With SR4 bit 2 clear, hardware writes only
+    /// half the planes; QEMU ignores the bit.
     pub fn check_memory(&self) -> Result<(), Complaint> {
         match self.registers[4] {
             Some(UNCHAINED) => Ok(()),
@@ -70,7 +70,7 @@ impl Sequencer {
         }
     }
 
-    /// What blanks the picture. QEMU ignores SR0 and SR1 bit 5.
+    /// Reports what blanks the screen. QEMU ignores SR0 and SR1 bit 5.
     pub fn check_picture(&self) -> Result<(), Complaint> {
         if self.registers[usize::from(RESET)] != Some(RUNNING) {
             return Err((

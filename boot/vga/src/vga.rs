@@ -1,4 +1,4 @@
-//! The card: ports and window decoded, faults noted, accesses counted.
+//! The whole card: decodes ports and window, records faults, counts accesses.
 
 use std::collections::BTreeMap;
 
@@ -15,11 +15,11 @@ use crate::ports::*;
 use crate::scanout::{Page, Picture};
 use crate::sequencer::Sequencer;
 
-/// Character clocks that each access takes: 0.95 us, as an 8-bit access does on an ISA bus.
+/// Character clocks of each access: 0.95 us, as an 8-bit access on an ISA bus.
 const ACCESS: usize = 3;
 
-/// How much time passes before an access, beside the time that the access takes: an interrupt handler
-/// ran, or the bus was busy.
+/// The time that passes before an access, in addition to the access's own time, because an interrupt handler
+/// ran or the bus was busy.
 struct Delay(Option<Box<dyn FnMut(Access) -> usize>>);
 
 impl std::fmt::Debug for Delay {
@@ -28,7 +28,7 @@ impl std::fmt::Debug for Delay {
     }
 }
 
-/// A card as the boot loader leaves it: in a linear mode, no VGA register known.
+/// A VGA in the boot loader's final state: in a linear mode, every VGA register unknown.
 #[derive(Debug)]
 pub struct Vga {
     pub(crate) sequencer: Sequencer,
@@ -39,7 +39,7 @@ pub struct Vga {
     pub(crate) memory: Memory,
     misc: Option<u8>,
     dispi_index: Option<u16>,
-    /// Bochs DISPI's linear mode, in which the VGA's registers do nothing.
+    /// Bochs DISPI's linear mode, in which the VGA's registers have no effect.
     dispi: bool,
     purpose: Purpose,
     /// Port writes by purpose, port and (on an index port) index.
@@ -52,7 +52,7 @@ pub struct Vga {
 }
 
 impl Vga {
-    /// A card as the boot loader leaves it.
+    /// A VGA in the boot loader's final state.
     pub fn new() -> Self {
         Self {
             sequencer: Sequencer::default(),
@@ -73,23 +73,23 @@ impl Vga {
         }
     }
 
-    /// The faults so far; they are the caller's business now.
+    /// Returns the faults so far and clears the list.
     pub fn take_faults(&mut self) -> Vec<Fault> {
         std::mem::take(&mut self.faults)
     }
 
-    /// Remembers every access from here on.
+    /// Starts a log of every access.
     pub fn start_log(&mut self) {
         self.log = Some(Vec::new());
     }
 
-    /// What was remembered; and remembers no more.
+    /// Returns the log and stops it.
     pub fn take_log(&mut self) -> Vec<Access> {
         self.log.take().unwrap_or_default()
     }
 
-    /// Port writes for a purpose to a port; on an index port to one register, whichever way it
-    /// was written.
+    /// Port writes with a purpose to a port. On an index port, counts the writes to one register, whether its
+    /// index and data were written together or apart.
     pub fn port_writes(&self, purpose: Purpose, port: u16, index: Option<u8>) -> u64 {
         self.writes
             .get(&(purpose, port, index))
@@ -97,26 +97,27 @@ impl Vga {
             .unwrap_or(0)
     }
 
-    /// Port writes for a purpose.
+    /// Port writes with a purpose.
     pub fn all_port_writes(&self, purpose: Purpose) -> u64 {
         let writes = self.writes.iter().filter(|((p, ..), _)| *p == purpose);
         writes.map(|(_, count)| count).sum()
     }
 
-    /// Bytes stored for a purpose.
+    /// Bytes stored with a purpose.
     pub fn bytes_stored(&self, purpose: Purpose) -> u64 {
         self.stores.get(&purpose).copied().unwrap_or(0)
     }
 
-    /// A byte of a plane, without the side effects of a load.
+    /// Returns a byte of a plane, without the side effects of a load.
     pub fn peek(&self, plane: usize, at: u16) -> u8 {
         self.memory.peek(plane, at)
     }
 
-    /// The page on the screen.
+    /// Returns the page on the screen.
     ///
     /// # Errors
-    /// Why there is none, or a garbled one; that is no fault of an access, so it is not noted.
+    /// The reason why the screen is blank or garbled. No access is at fault, so the reason is not added to
+    /// the list of faults.
     pub fn page(&self) -> Result<Page, Fault> {
         Page::of(self).map_err(|(name, state)| Fault {
             name,
@@ -125,7 +126,7 @@ impl Vga {
         })
     }
 
-    /// The picture on the monitor.
+    /// Returns the image on the monitor.
     ///
     /// # Errors
     /// As [`Vga::page`].
@@ -133,7 +134,7 @@ impl Vga {
         Ok(self.page()?.scan_out())
     }
 
-    /// Has the beam move until a start address is taken over, as a monitor would without any program.
+    /// Moves the beam until a start address is latched, as on a monitor without any program.
     pub fn finish_frame(&mut self) {
         match self.crtc.to_take_over() {
             Some(clocks) => self.crtc.advance(clocks),
@@ -149,12 +150,13 @@ impl Vga {
         self.crtc.advance(clocks);
     }
 
-    /// Has `delay` say before each access how many character clocks pass, beside those of the access.
+    /// Sets a function that returns, for each access, how many character clocks pass before it, in addition
+    /// to the access's own.
     pub fn set_delay(&mut self, delay: impl FnMut(Access) -> usize + 'static) {
         self.delay = Delay(Some(Box::new(delay)));
     }
 
-    /// Sets when a new start address is taken over.
+    /// Sets when a new start address is latched.
     pub fn set_latch(&mut self, latch: Latch) {
         self.crtc.set_latch(latch);
     }
@@ -169,7 +171,7 @@ impl Vga {
         }
     }
 
-    /// Each access takes its time, and has its effect at the end of it.
+    /// Each access has a duration, and has its effect at the end of it.
     fn log(&mut self, access: Access) {
         let delay = self.delay.0.as_mut().map_or(0, |delay| delay(access));
         self.crtc.advance(ACCESS + delay);
@@ -178,7 +180,7 @@ impl Vga {
         }
     }
 
-    /// Each access to the VGA proper begins here.
+    /// Begins an access to the VGA's own ports or window.
     fn begin(&mut self, access: Access) {
         self.log(access);
         if self.dispi {
@@ -229,7 +231,7 @@ impl Vga {
         Ok(())
     }
 
-    /// What is wrong with reaching a byte of the window now.
+    /// Reports what prevents a correct access to a byte of the window now.
     fn check_memory(&self, at: u16) -> Result<(), Complaint> {
         self.sequencer.check_memory()?;
         self.graphics.check_window()?;
@@ -242,7 +244,8 @@ impl Vga {
         Ok(())
     }
 
-    /// A store to a page that is on the screen, or will be at the next retrace, is seen.
+    /// Reports a store to a page that is on the screen, or will be after the next latch of the start address:
+    /// the store would be visible.
     fn check_hidden(&self, at: u16) -> Result<(), Complaint> {
         if self.purpose == Purpose::Setup || !self.sequencer.screen_is_on() {
             return Ok(());
@@ -273,7 +276,7 @@ impl Vga {
         self.memory.store(at, value, self.sequencer.map_mask());
     }
 
-    /// A register read that finds nothing known.
+    /// Reports a read of a register whose value is unknown.
     fn known(&mut self, access: Access, value: Option<u8>, what: &str) -> u8 {
         if value.is_none() {
             self.note(

@@ -1,37 +1,37 @@
-//! Perspective: from the viewer's space to 1/256 pixel.
+//! Perspective projection from view space to 1/256 pixel.
 
 use modex::{HEIGHT, WIDTH};
 use texmap::SUBPIXELS;
 
 use crate::Vec3;
 
-/// Pixels on the screen for one unit at distance one. The eye is at the origin and looks along
-/// z; the middle of the screen is the corner between four pixels.
+/// Pixels on the screen for one unit at distance one. The eye is at the origin and looks along z; the
+/// screen's centre is the corner between four pixels.
 pub const FOCAL_LENGTH: i32 = 258;
 
-/// Nearest z that is seen, 16.16: 1/512 unit, where the near plane cuts.
+/// The near plane's z, 16.16: 1/512 unit, the nearest visible z.
 ///
-/// A line of sight through a pixel is at most 1.2654 times as long as its z (the screen's corner
-/// is 200 pixels from its middle). So of a face whose plane is 1/404 unit or more from the eye,
-/// the near plane cuts away nothing that is on the screen, and the eye may come as near as 1/256
-/// unit with room for the rounding. Nearer, the face opens before the eye like a window.
+/// A line of sight through a pixel is at most 1.2654 times as long as its z (the screen's corner is 200
+/// pixels from its centre). So if the plane of a face is 1/404 unit or more from the eye, the near plane cuts
+/// away nothing that is on the screen, and the eye may come as near as 1/256 unit with room for the rounding.
+/// Nearer than that, a hole opens in the face before the eye.
 pub const NEAR: i32 = 1 << 7;
 
 /// Subpixels on the screen for one unit at distance one.
 const SCALE: i64 = FOCAL_LENGTH as i64 * SUBPIXELS as i64;
-/// The middle of the screen in subpixels.
+/// The centre of the screen in subpixels.
 const MIDDLE: (i32, i32) = (WIDTH as i32 / 2 * SUBPIXELS, HEIGHT as i32 / 2 * SUBPIXELS);
 
-/// The screen position of a point in 16.16, rounded to 1/256 pixel (half up). The point is inside
-/// the near plane and the guard band.
+/// The screen position of a point in 16.16, rounded to 1/256 pixel (half up). The point is inside the near
+/// plane and the guard band.
 pub(crate) fn project(point: Vec3) -> (i32, i32) {
     let [x, y, z] = point.map(i64::from);
     let round = |n: i64| (2 * n + z).div_euclid(2 * z) as i32;
     (round(x * SCALE) + MIDDLE.0, round(y * SCALE) + MIDDLE.1)
 }
 
-/// The same for a point with more fraction bits: below 2^52 in size. With zeros for the further
-/// bits it is the same position.
+/// Projects a point with more fraction bits, below 2^52 in size. If the additional bits are zero, the
+/// position equals that of [`project`].
 pub(crate) fn project_fine(point: [i64; 3]) -> (i32, i32) {
     let [x, y, z] = point.map(i128::from);
     let scale = i128::from(SCALE);
@@ -43,7 +43,7 @@ pub(crate) fn project_fine(point: [i64; 3]) -> (i32, i32) {
 mod tests {
     use super::*;
 
-    /// Both projections, which have to agree.
+    /// Checks that both projections agree, and returns the position.
     fn both(point: Vec3) -> (i32, i32) {
         let fine = project_fine(point.map(|k| i64::from(k) << 28));
         assert_eq!(fine, project(point), "{point:?}");

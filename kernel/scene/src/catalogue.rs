@@ -1,7 +1,7 @@
-//! Every built-in scene by name, a file for each: the ball, the knot, the corridor, and the scenes that measure
+//! The built-in scenes, one file for each: the ball, the knot, the corridor, and the scenes that measure
 //! mappers.
 //!
-//! Each measuring scene asks one question of a mapper. They share the ball's palette and light.
+//! Each measuring scene tests one property of a mapper. They share the ball's palette and light.
 
 pub(crate) mod ball;
 mod corridor;
@@ -17,7 +17,7 @@ mod wall;
 pub use crate::entry::{Colours, Entry, MAX_TEXELS, Textures};
 
 impl Entry<'static> {
-    /// Returns the built-in scene of a name.
+    /// Returns the built-in scene with this name.
     pub fn parse(name: &str) -> Option<&'static Self> {
         CATALOGUE.iter().find(|entry| entry.name == name)
     }
@@ -48,7 +48,7 @@ mod tests {
     use std::collections::HashSet;
     use std::vec::Vec;
 
-    /// Ticks from all of a turn, of no regularity.
+    /// Ticks from a whole turn, at irregular intervals.
     const TICKS: [u32; 9] = [0, 1, 89, 180, 271, 360, 447, 540, 719];
 
     /// Calls `check` with an entry and a stage of it.
@@ -60,7 +60,7 @@ mod tests {
         check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
     }
 
-    /// Of each vertex of a mesh at a tick, how far away it is.
+    /// The distance of each vertex of a mesh at a tick.
     fn depths(entry: &Entry<'_>, tick: u32) -> Vec<i32> {
         let pose = entry.pose(tick);
         let orientation = pose.orientation();
@@ -111,7 +111,7 @@ mod tests {
                 seen.insert(texture.texels().to_vec());
             }
         }
-        // A floor has the board of the tilted square, and the moire the corridor's two.
+        // A floor uses the board of the tilted square, and the moire scene uses the corridor's two textures.
         assert_eq!(seen.len(), CATALOGUE.len() - 1);
     }
 

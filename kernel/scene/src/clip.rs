@@ -2,44 +2,41 @@
 //!
 //! # Where
 //!
-//! Both cut in the viewer's space, before anything is rounded to the screen's grid: first the
-//! near plane, then the guard band's left, right, top and bottom. Once nothing is nearer than
-//! [`NEAR`], x / z <= k is the same as x <= k z: the guard planes are planes through the eye. What
-//! is exactly on a plane is inside. The screen's own border is none of them: it cuts columns.
+//! Both cut in view space, before anything is rounded to the screen's grid: first the near plane, then the
+//! guard band's left, right, top and bottom. Once nothing is nearer than [`NEAR`], x / z <= k is equivalent
+//! to x <= k z: the guard planes are planes through the eye. A point exactly on a plane is inside. The
+//! screen's own border is not one of the planes: it cuts columns and makes no vertices.
 //!
 //! # Why neighbours agree
 //!
-//! Two faces that share an edge must go on sharing it, bit for bit, or pixels along it are left
-//! out or written twice.
+//! Two faces with a common edge must still have it in common after clipping, bit for bit, or pixels along it
+//! are left out or written twice.
 //!
-//! - A crossing is computed from the edge's two ends as they stand, *from the end inside to the
-//!   end outside*, whichever way the face walks the edge; and it is the exact point, rounded once.
-//! - Each plane replaces what is left of an edge by what is inside that plane. That depends on
-//!   the edge's two ends only, so by induction both faces are left with the same piece of it after
-//!   each plane, also where several planes cut one edge.
-//! - All planes are asked, in the one order, as soon as one of a face's corners is outside any of
-//!   them. A crossing is rounded, and may come to lie by that much outside a plane that no corner
-//!   was outside of; a face that skipped that plane would disagree with one that did not. A face
-//!   that is not clipped at all has no such edge: both its ends are inside all planes.
-//! - Places in the texture take no part in any of it, so a seam of the texture is no seam of the
-//!   solid.
+//! - A crossing is computed from the edge's two end points, unmodified, *from the end inside to the end
+//!   outside*, whichever way the face walks the edge; and it is the exact point, rounded once.
+//! - Each plane replaces the remaining piece of an edge by the part inside that plane. That depends on the
+//!   edge's two end points only. By induction both faces keep the same piece after each plane, also where
+//!   several planes cut one edge.
+//! - As soon as one of a face's corners is outside any plane, all planes cut the face, in one fixed order. A
+//!   crossing is rounded, and may lie outside a plane by the rounding error although no corner was outside of
+//!   that plane. If a face skipped that plane, it would disagree with a face that did not. A face that is not
+//!   clipped at all has no such edge: both ends of each edge are inside all planes.
+//! - Texture coordinates take no part in these decisions, so a seam of the texture is no seam of the solid.
 //!
 //! # The arithmetic
 //!
-//! A corner has [`FINE`] more fraction bits than a vertex of the mesh: below 2^52 in size. Its
-//! height above a plane is exact and below 2^68; a crossing's product stays below 2^122. A
-//! crossing is rounded to 2^-44 unit (half up). On the screen that is most where z is least and
-//! x / z most: (258 x 256 / NEAR) (1 + 128) 2^-29, less than 1/8000 of 1/256 pixel. The guard
-//! band ends on a whole number of 1/256 pixels, so five such errors cannot round a vertex out of
-//! it.
+//! A corner has [`FINE`] more fraction bits than a vertex of the mesh: below 2^52 in size. Its height above a
+//! plane is exact and below 2^68; a crossing's product stays below 2^122. A crossing is rounded to 2^-44 unit
+//! (half up). On the screen that error is largest where z is least and x / z most: (258 x 256 / NEAR) (1 +
+//! 128) 2^-29, less than 1/8000 of 1/256 pixel. The guard band ends on a whole number of 1/256 pixels, so
+//! five such errors cannot round a vertex out of it.
 //!
 //! # How many corners
 //!
-//! A plane adds at most one corner to a convex polygon: [`MAX_CORNERS`](crate::MAX_CORNERS) of a
-//! face and [`PLANES`] new ones are [`MAX_SIDES`]. (Turning rounds vertices, so a face of four or
-//! more corners that is seen exactly edge-on may be bent by 2^-16 unit; only one of nearly
-//! `MAX_CORNERS` corners, bent many times over, could come to have too many. It would be dropped
-//! and counted.)
+//! A plane adds at most one corner to a convex polygon: [`MAX_CORNERS`](crate::MAX_CORNERS) of a face and
+//! [`PLANES`] new corners make [`MAX_SIDES`]. (Turning rounds vertices, so a face of four or more corners
+//! that is seen exactly edge-on may be bent by 2^-16 unit. Only a face of nearly `MAX_CORNERS` corners, bent
+//! many times over, could get too many corners. It would be dropped and counted.)
 
 use modex::{HEIGHT, WIDTH};
 use texmap::{MAX_COORDINATE, MAX_SIDES, SUBPIXELS, Vertex};
@@ -47,22 +44,22 @@ use texmap::{MAX_COORDINATE, MAX_SIDES, SUBPIXELS, Vertex};
 use crate::camera::{FOCAL_LENGTH, NEAR, project, project_fine};
 use crate::{Corner, Vec3};
 
-/// How many planes clip.
+/// Number of clip planes.
 pub(crate) const PLANES: usize = 5;
 
 /// Fraction bits of a corner beyond the 16 of a vertex.
 const FINE: u32 = 28;
 
-/// The guard band's end: pixels from the screen's corner, either way.
+/// The end of the guard band: pixels from the screen's origin, in either direction.
 const GUARD: i64 = (MAX_COORDINATE / SUBPIXELS) as i64;
 
-/// Half a space: the points whose product with `form` is at least `least`.
+/// A half-space: the points whose product with `form` is at least `least`.
 struct Plane {
     form: [i64; 3],
     least: i64,
 }
 
-/// In the order in which they cut.
+/// The clip planes, in the order in which they cut.
 static CLIPS: [Plane; PLANES] = {
     const fn guard(form: [i64; 3]) -> Plane {
         Plane { form, least: 0 }
@@ -74,7 +71,7 @@ static CLIPS: [Plane; PLANES] = {
             form: [0, 0, 1],
             least: NEAR as i64,
         },
-        // focal x / z + middle >= -GUARD, and <= GUARD.
+        // focal x / z + centre >= -GUARD, and <= GUARD.
         guard([focal, 0, GUARD + x]),
         guard([-focal, 0, GUARD - x]),
         guard([0, focal, GUARD + y]),
@@ -82,26 +79,26 @@ static CLIPS: [Plane; PLANES] = {
     ]
 };
 
-/// A vertex of the mesh, ready for all faces that meet in it.
+/// A vertex of the mesh in view space, shared by all faces that meet in it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Point {
-    /// In the viewer's space, 16.16.
+    /// In view space, 16.16.
     view: Vec3,
-    /// On the screen in 1/256 pixel, if it is inside all planes.
+    /// On the screen in 1/256 pixel, if the vertex is inside all planes.
     screen: (i32, i32),
-    /// Bit i: it is outside plane i.
+    /// Bit i is set if the vertex is outside plane i.
     outside: u8,
 }
 
 impl Point {
-    /// What an arena holds before the first picture.
+    /// The initial value of an arena's points.
     pub const ORIGIN: Self = Self {
         view: [0; 3],
         screen: (0, 0),
         outside: 0,
     };
 
-    /// A vertex in the viewer's space: |x| and |y| are below 2^23 (128 units), |z| below 2^24.
+    /// A vertex in view space: |x| and |y| are below 2^23 (128 units), |z| below 2^24.
     pub fn new(view: Vec3) -> Self {
         let mut outside = 0;
         let wide = view.map(i64::from);
@@ -120,22 +117,22 @@ impl Point {
 }
 
 impl Point {
-    /// In the viewer's space, 16.16.
+    /// In view space, 16.16.
     pub fn view(&self) -> Vec3 {
         self.view
     }
 }
 
-/// A corner between the planes.
+/// A corner during clipping.
 #[derive(Clone, Copy, Default)]
 struct Placed {
-    /// In the viewer's space, 16 + FINE fraction bits.
+    /// In view space, 16 + FINE fraction bits.
     at: [i64; 3],
     u: i32,
     v: i32,
 }
 
-/// What the planes have left of a face.
+/// The part of a face that the planes have left.
 struct Outline {
     corners: [Placed; MAX_SIDES],
     len: usize,
@@ -149,14 +146,14 @@ impl Outline {
         }
     }
 
-    /// Adds a corner, or nothing comes back if there is no room.
+    /// Adds a corner, or returns `None` if the outline is full.
     fn push(&mut self, corner: Placed) -> Option<()> {
         *self.corners.get_mut(self.len)? = corner;
         self.len += 1;
         Some(())
     }
 
-    /// What is inside `plane`, or nothing if it has more than [`MAX_SIDES`] corners.
+    /// Returns the part inside `plane`, or `None` if it has more than [`MAX_SIDES`] corners.
     fn cut(&self, plane: &Plane) -> Option<Self> {
         let mut kept = Self::new();
         let corners = &self.corners[..self.len];
@@ -178,7 +175,7 @@ impl Outline {
 }
 
 impl Plane {
-    /// How far `corner` is inside, in the units of the plane's form.
+    /// The distance of `corner` inside the plane, in the units of the plane's form.
     fn height(&self, corner: &Placed) -> i128 {
         let product: i128 = (0..3)
             .map(|k| i128::from(self.form[k]) * i128::from(corner.at[k]))
@@ -187,9 +184,9 @@ impl Plane {
     }
 }
 
-/// Where the edge from the end inside to the end outside meets the plane that they are `above`
-/// (more than 0) and `below` (less than 0). All of it lies between the two ends, the place in the
-/// texture too: there is nothing to clamp.
+/// The point where the edge from the end inside to the end outside meets the plane. `above` (more than 0) and
+/// `below` (less than 0) are the heights of the two ends. The point and its texture coordinates lie between
+/// the two ends, so nothing needs clamping.
 fn crossing(inside: &Placed, outside: &Placed, above: i128, below: i128) -> Placed {
     let whole = above - below;
     let between = |from: i64, to: i64| {
@@ -203,8 +200,8 @@ fn crossing(inside: &Placed, outside: &Placed, above: i128, below: i128) -> Plac
     }
 }
 
-/// Puts a face on the screen, clipped if it has to be, and says how many vertices of `polygon` it
-/// took: fewer than 3 if nothing is to be seen, or nothing if it would take more than there are.
+/// Projects a face to the screen, clipped if necessary, and returns how many vertices of `polygon` it uses:
+/// fewer than 3 if nothing is visible. Returns `None` if the face needs more than [`MAX_SIDES`] vertices.
 pub(crate) fn place(
     corners: &[Corner],
     points: &[Point],
@@ -234,7 +231,7 @@ pub(crate) fn place(
     clip(corners, points, polygon)
 }
 
-/// Rare, and kept out of the way of what is not.
+/// Cold path: clipping is rare, so it stays out of the common path.
 #[cold]
 fn clip(corners: &[Corner], points: &[Point], polygon: &mut [Vertex; MAX_SIDES]) -> Option<usize> {
     let mut outline = Outline::new();
@@ -274,8 +271,8 @@ mod tests {
 
     const SIDE: i32 = 256 << 16;
 
-    /// A face of these points, placed; the corners' places in the texture are spread over all of
-    /// it, the same for the same point.
+    /// Places a face with these points as corners. The texture coordinates are spread over the whole texture,
+    /// and equal points get equal coordinates.
     fn placed(views: &[Vec3]) -> Vec<Vertex> {
         let points: Vec<_> = views.iter().map(|&view| Point::new(view)).collect();
         let corners: Vec<_> = (0..)
@@ -306,13 +303,13 @@ mod tests {
         pixels
     }
 
-    /// All sizes alike, from 1 to the largest.
+    /// A random coordinate; every magnitude from 1 to the largest is equally likely.
     fn coordinate(random: &mut fastrand::Rng, bits: u32) -> i32 {
         let size = 1 << random.u32(0..=bits);
         random.i32(-size + 1..size)
     }
 
-    /// Before, behind and beside the eye, and often exactly on a plane.
+    /// A random point before, behind or beside the eye, often exactly on a plane.
     fn view(random: &mut fastrand::Rng) -> Vec3 {
         let mut view = [23, 23, 24].map(|bits| coordinate(random, bits));
         match random.u8(0..8) {
@@ -331,7 +328,7 @@ mod tests {
                 }
             }
             2 => view[2] = NEAR + coordinate(random, 7),
-            // On the screen, or not far from it.
+            // On the screen, or near it.
             3 | 4 => {
                 view[2] = random.i32(NEAR..1 << 20);
                 view[0] = random.i32(-view[2]..=view[2]);
@@ -344,7 +341,7 @@ mod tests {
 
     #[test]
     fn each_plane_begins_exactly_where_it_says() {
-        // At, inside, beyond; and where `at` is on the screen.
+        // A point on the plane, the step outward, and the point's place on the screen.
         let most = MAX_COORDINATE;
         for (plane, at, beyond, on_screen) in [
             (0, [0, 0, NEAR], [0, 0, -1], (160 * 256, 120 * 256)),
@@ -360,7 +357,8 @@ mod tests {
             assert_eq!(Point::new(at).screen, on_screen, "{at:?}");
             assert_eq!(Point::new(step(-1)).outside, 0, "{at:?}");
             assert_eq!(Point::new(step(1)).outside, 1 << plane, "{at:?}");
-            // A triangle with that corner keeps it, or loses it for two more; none is illegal.
+            // A triangle keeps a corner on or inside the plane; a corner outside is replaced by two. Each
+            // result is legal.
             let others = [[900, 900, 2000], [-1200, 300, 2000]];
             let sides = |view| {
                 let polygon = placed(&[view, others[0], others[1]]);
@@ -369,11 +367,11 @@ mod tests {
             };
             assert_eq!([sides(at), sides(step(-1)), sides(step(1))], [3, 3, 4]);
         }
-        // The whole face on the plane is inside; all of it beyond is nothing at all.
+        // A face that lies in the plane is inside; a face beyond the plane vanishes.
         let near = |z| placed(&[[-9, -9, z], [9, -9, z], [9, 9, z], [-9, 9, z]]);
         assert_eq!(near(NEAR).len(), 4);
         assert_eq!(near(NEAR - 1), []);
-        // One corner or edge on the plane and the rest beyond encloses no pixel.
+        // A face with one corner or edge on the plane and the rest beyond encloses no pixel.
         let touching = placed(&[[0, 0, NEAR], [99, 0, 0], [0, 99, 0]]);
         assert!(touching.len() < 3, "{touching:?}");
         let touching = placed(&[[0, 0, NEAR], [99, 0, NEAR], [0, 99, 0]]);
@@ -384,7 +382,7 @@ mod tests {
     fn a_crossing_is_the_exact_point_rounded_with_ties_up() {
         let end = |at, u, v| Placed { at, u, v };
         let (inside, outside) = (end([0, 3, 8], 0, SIDE), end([3, 0, 8], SIDE, SIDE - 3));
-        // The parts of the way: a half, a third, two thirds.
+        // Fractions of the way: a half, a third, two thirds.
         for (above, below, at, u, v) in [
             (1, -1, [2, 2, 8], SIDE / 2, SIDE - 1),
             (1 << 67, -(1 << 67), [2, 2, 8], SIDE / 2, SIDE - 1),
@@ -394,7 +392,7 @@ mod tests {
             let crossing = crossing(&inside, &outside, above, below);
             assert_eq!((crossing.at, crossing.u, crossing.v), (at, u, v));
         }
-        // The largest that the products have room for.
+        // The largest values that the products have room for.
         let (far, least, most) = ((1 << 51) - 1, -(1i64 << 51), (1 << 52) - 1);
         let (inside, outside) = (end([far, least, most], 0, 0), end([-far, far, least], 0, 0));
         let height = (1i128 << 68) - 1;
@@ -402,8 +400,8 @@ mod tests {
         assert_eq!(middle.at, [0, 0, 1 << 50]);
     }
 
-    /// The edge alone, as a face of two corners: what is left of it must stand, bit for bit and
-    /// place in the texture included, in every face that has the edge, walked either way.
+    /// Clips the edge alone, as a face of two corners. Every face with that edge, walked in either direction,
+    /// must contain the remaining piece bit for bit, texture coordinates included.
     #[test]
     fn every_face_of_an_edge_is_left_with_the_same_piece_of_it() {
         let mut random = seeded::generator();
@@ -435,7 +433,7 @@ mod tests {
         let mut random = seeded::generator();
         let mut most = 0;
         for _ in 0..seeded::cases(100_000) {
-            // A convex face: a ring about a middle, in a random plane.
+            // A convex face: a ring about a centre, in a random plane.
             let corners = random.usize(3..=MAX_CORNERS);
             let [middle, p, q] = [0; 3].map(|_| view(&mut random).map(|k| k / 3));
             let face: Vec<Vec3> = (0..corners)
@@ -465,9 +463,9 @@ mod tests {
         assert!(!seeded::is_whole() || most > MAX_CORNERS, "{most}");
     }
 
-    /// Against lines of sight and the unrounded triangle: only a pixel within 1/128 of a true edge
-    /// may be on the other side. The near plane's cut is such an edge; the guard band makes none
-    /// that is on the screen.
+    /// Compares with lines of sight and the unrounded triangle: only a pixel within 1/128 pixel of a true
+    /// edge may be on the other side. The near plane's cut counts as such an edge; the guard band makes no
+    /// edge on the screen.
     #[test]
     fn clipped_triangles_cover_what_the_lines_of_sight_meet() {
         let cross = |a: [f64; 3], b: [f64; 3]| {
@@ -488,7 +486,7 @@ mod tests {
             let [a, b, c] = views.map(|view| view.map(f64::from));
             let volume = dot(a, cross(b, c));
             let front = volume.signum();
-            // Each is more than 0 inside: form . (x, y, 1) + constant.
+            // Each form is more than 0 inside: form . (x, y, 1) + constant.
             let normals = [cross(a, b), cross(b, c), cross(c, a)];
             let mut forms = normals.map(|n| (n.map(|k| k * front), 0.0)).to_vec();
             let sum = [0, 1, 2].map(|k| normals.iter().map(|n| n[k]).sum::<f64>());
@@ -528,10 +526,10 @@ mod tests {
     fn behind_the_eye_and_edge_on_nothing_is_seen() {
         let behind = [[-500, -400, -1], [900, 100, -70_000], [0, 800, 0]];
         assert_eq!(placed(&behind), []);
-        // Far to one side: gone, without a vertex.
+        // Far to one side: removed, without a vertex.
         let aside = [[1 << 23, 0, 9], [1 << 23, 99, 300], [1 << 22, -999, 500]];
         assert_eq!(placed(&aside), []);
-        // In a plane with the eye, from before it to behind it.
+        // In a plane with the eye, from in front of it to behind it.
         for face in [
             [[-3000, 0, 5000], [3000, 0, 5000], [0, 0, -5000]],
             [[0, -3000, 5000], [0, 3000, 5000], [0, 0, -5000]],

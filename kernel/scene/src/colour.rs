@@ -1,25 +1,25 @@
 //! The palette, the light table and the background.
 //!
 //! # Why ramps
-//! 256 colours have to serve every hue in every light. A search for the nearest entry to each lit
-//! colour would jump between hues from one facet to the next; so the palette is [`RAMPS`] ramps,
-//! each one material from night to glint, and light only ever moves a colour *along its ramp*. A
-//! texture names a ramp and a shade, and may use nothing else.
+//! 256 colours have to serve every hue in every light. A search for the entry nearest to each lit colour
+//! would jump between hues from one facet to the next. So the palette consists of [`RAMPS`] ramps, each one a
+//! material from night to glint, and light only ever moves a colour *along its ramp*. A texture names a ramp
+//! and a shade, and may use no other colour.
 //!
 //! # Why the hue shifts
-//! A shadow is not the colour times a half: what is turned from the lamp is lit by the night
-//! sky. All ramps therefore begin in the same night blue and end near the white of the lamp, and
-//! only between are they themselves. The dark side of seven materials falls together into one
-//! dusk, and a highlight looks like a reflection instead of a brighter paint.
+//! A shadow is not the colour times a half: the night sky lights whatever faces away from the lamp. All ramps
+//! therefore begin in the same night blue and end near the white of the lamp, and show the material's own hue
+//! only in between. The dark side of seven materials merges into one dusk, and a highlight looks like a
+//! reflection instead of a brighter paint.
 //!
 //! # Why a table
-//! A facet has one light level, so a whole texture is run through one row of [`LIGHT_TABLE`] when
-//! the scene is set, and drawing costs nothing more (see [`Stage`](crate::Stage)). The same row
-//! first dims (diffuse light) and then adds (the highlight), which no product could do.
+//! A facet has one light level, so a whole texture is run through one row of [`LIGHT_TABLE`] when the scene
+//! is set, and drawing costs no more (see [`Stage`](crate::Stage)). The same row first dims (diffuse light)
+//! and then adds (the highlight), which no product could do.
 //!
 //! # The background
-//! It knows its scan line and nothing else: dusk over a sea. Between two neighbouring colours
-//! the lines alternate, so that no step of the 6-bit DAC is seen as an edge.
+//! The background is a function of the scan line alone: dusk over a sea. Between two neighbouring colours the
+//! lines alternate, so that no step of the 6-bit DAC is visible as an edge.
 
 use core::ops::Range;
 
@@ -29,7 +29,7 @@ use crate::Vec3;
 
 /// Light levels, from the dark side to the highlight.
 pub const LIGHT_LEVELS: usize = 24;
-/// What each colour becomes at each light level.
+/// The lit colour of each colour at each light level.
 pub type LightTable = [[u8; 256]; LIGHT_LEVELS];
 
 /// The DAC's colours.
@@ -38,14 +38,14 @@ pub static PALETTE: Palette = palette();
 pub static LIGHT_TABLE: LightTable = light_table();
 /// The colour of each scan line behind the solid.
 pub static BACKGROUND: [u8; HEIGHT] = background(HORIZON);
-/// The same with the horizon level with the eye: where floors go.
+/// The same background with the horizon at eye level, for scenes with a floor or a wall.
 pub static LEVEL_BACKGROUND: [u8; HEIGHT] = background(HEIGHT / 2);
 
 /// Black: entry 0, which the overscan shows.
 const BLACK: u8 = 0;
-/// For writing on the picture: bright, and untouched by light.
+/// For text over the frame: bright, and not changed by light.
 pub const WHITE: u8 = 1;
-/// For what is to stand out in the writing.
+/// For emphasis in the text.
 pub const YELLOW: u8 = 2;
 
 /// First colour of the ramps.
@@ -58,8 +58,8 @@ pub const RAMPS: usize = 7;
 /// A material: its ramp in the palette.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Ramp {
-    /// Enamel, between [`Ramp::Rose`] and [`Ramp::Indigo`]: neighbours differ little, so that
-    /// clouds may pass from one to the next.
+    /// Enamel, between [`Ramp::Rose`] and [`Ramp::Indigo`]: neighbours differ little, so that clouds may pass
+    /// from one to the next.
     Violet,
     /// Enamel, the colour of the night.
     Indigo,
@@ -76,14 +76,14 @@ pub enum Ramp {
 }
 
 impl Ramp {
-    /// The colour at a shade below [`SHADES`]; the upper quarter is best left to the highlight.
+    /// The colour at a shade below [`SHADES`]. Textures should leave the upper quarter to the highlight.
     pub const fn shade(self, shade: usize) -> u8 {
         (FIRST_SHADE + self as usize * SHADES + shade) as u8
     }
 }
 
-/// Each ramp's night, shadow, body, light and glint. At the same shade all enamels are about
-/// equally bright, so that only hue changes where two of them meet.
+/// Each ramp's night, shadow, body, light and glint. At the same shade all enamels are about equally bright,
+/// so that only the hue changes where two of them meet.
 #[rustfmt::skip]
 const ANCHORS: [[Rgb6; 5]; RAMPS] = [
     [[ 2,  1,  7], [13,  4, 25], [32, 11, 46], [50, 34, 61], [63, 58, 63]], // violet
@@ -95,19 +95,19 @@ const ANCHORS: [[Rgb6; 5]; RAMPS] = [
     [[ 4,  4, 10], [17, 17, 30], [38, 38, 49], [56, 54, 55], [63, 63, 63]], // pearl
 ];
 
-/// First colour of the sky, the zenith; its last is the horizon.
+/// First colour of the sky, at the zenith; its last colour is at the horizon.
 const FIRST_SKY: usize = FIRST_SHADE + RAMPS * SHADES;
-/// The entries that neither a background nor writing has: where a loaded model puts its own colours.
+/// The entries that neither a background nor text uses: a loaded model puts its own colours there.
 pub const MATERIALS: Range<usize> = FIRST_SHADE..FIRST_SKY;
-/// Colours of the sky: as many as its steepest stretch has steps of the DAC.
+/// Colours of the sky: enough that two neighbouring lines differ by at most 4 of the DAC's 63 steps.
 const SKY: usize = 52;
-/// First colour of the sea, the deep; its last is the glitter below the horizon.
+/// First colour of the sea, in the deep; its last colour is the glitter below the horizon.
 const FIRST_SEA: usize = FIRST_SKY + SKY;
 /// Colours of the sea.
 const SEA: usize = 256 - FIRST_SEA;
 
-/// Dusk: half the sky is night, so that the lit side of the ball stands out; the glow is low and
-/// behind its dark side.
+/// Dusk: half the sky is night, so that the lit side of the ball stands out. The glow is low and behind the
+/// ball's dark side.
 const ZENITH_TO_HORIZON: [Rgb6; 9] = [
     [1, 1, 6],
     [2, 2, 10],
@@ -119,7 +119,7 @@ const ZENITH_TO_HORIZON: [Rgb6; 9] = [
     [40, 22, 32],
     [60, 42, 34],
 ];
-/// The sea shows the sky upside down, and dimmer.
+/// The sea reflects the sky upside down, and dimmer.
 const DEEP_TO_GLITTER: [Rgb6; 5] = [
     [2, 2, 9],
     [6, 5, 17],
@@ -148,12 +148,12 @@ const fn palette() -> Palette {
     palette
 }
 
-/// Fills `count` entries from `first` on with colours evenly along `anchors`.
+/// Fills `count` entries from `first` on with colours spaced evenly along `anchors`.
 const fn blend(palette: &mut Palette, first: usize, count: usize, anchors: &[Rgb6]) {
     let (steps, spans) = (count - 1, anchors.len() - 1);
     let mut i = 0;
     while i < count {
-        // The last colour ends the last span, it does not begin another.
+        // The last colour ends the last span and does not begin another.
         let span = if i == steps {
             spans - 1
         } else {
@@ -170,12 +170,13 @@ const fn blend(palette: &mut Palette, first: usize, count: usize, anchors: &[Rgb
     }
 }
 
-/// The level at which a texture has the colours it was painted in. Below it is dimmed; above it
-/// the highlight is added.
+/// The level at which a texture has the colours it was painted in. Lower levels dim it; higher levels add the
+/// highlight.
 pub const FULL_LIGHT: usize = 17;
-/// Light from everywhere, in levels: what keeps the dark side from black.
+/// Ambient light, in levels: keeps the dark side from black.
 pub const AMBIENT: usize = 4;
-/// Half shades that a level of highlight adds: enamel half way to white, metal nearly to it.
+/// Half shades that each level of highlight adds: enough to bring enamel half-way to white, and metal nearly
+/// to it.
 const SHINE: [usize; RAMPS] = [3, 3, 3, 3, 3, 4, 3];
 
 const fn light_table() -> LightTable {
@@ -184,7 +185,7 @@ const fn light_table() -> LightTable {
     while level < LIGHT_LEVELS {
         let mut colour = 0;
         while colour < 256 {
-            // Neither the background nor writing is lit.
+            // Neither the background nor text is lit.
             table[level][colour] = colour as u8;
             colour += 1;
         }
@@ -208,13 +209,13 @@ const fn light_table() -> LightTable {
     table
 }
 
-/// First line of the sea: below the ball's middle, so that the glow is behind its dark side.
+/// First line of the sea: below the ball's centre, so that the glow is behind its dark side.
 const HORIZON: usize = 178;
 
 const fn background(horizon: usize) -> [u8; HEIGHT] {
     let mut lines = [0; HEIGHT];
-    // Eighths that are added to a line's place between two colours before it is cut to one. Any
-    // eight lines in a row have all of them, and neighbours are far apart.
+    // Eighths that are added to a line's position between two colours before it is rounded down. Any eight
+    // lines in a row use all of them, and neighbours differ widely.
     let thresholds = [0, 4, 2, 6, 1, 5, 3, 7];
     let mut y = 0;
     while y < horizon {
@@ -222,7 +223,7 @@ const fn background(horizon: usize) -> [u8; HEIGHT] {
         lines[y] = (FIRST_SKY + (eighths + thresholds[y % 8]) / 8) as u8;
         y += 1;
     }
-    // The horizon has the last colour; no threshold, at most 7/8, takes it to the next.
+    // The horizon has the last colour; no threshold, at most 7/8, moves it to the next.
     assert!(lines[horizon - 1] as usize == FIRST_SKY + SKY - 1);
     let sea = HEIGHT - horizon;
     while y < HEIGHT {
@@ -237,22 +238,21 @@ const fn background(horizon: usize) -> [u8; HEIGHT] {
     lines
 }
 
-/// Towards the lamp: from the upper left, before the screen; a unit vector, 14 fraction bits.
+/// Towards the lamp, which is at the upper left in front of the screen; a unit vector, 14 fraction bits.
 const LAMP: [i64; 3] = [-7000, -6200, -13_400];
-/// Halfway between the lamp and the viewer: where a mirror would show the lamp.
+/// Halfway between the lamp and the viewer: the normal at which a mirror would show the lamp.
 const HALFWAY: [i64; 3] = [-3674, -3254, -15_632];
-/// Towards the dusk behind the ball, opposite the lamp: draws the rim of the dark side.
+/// Towards the dusk behind the ball, opposite the lamp: lights the rim of the dark side.
 const DUSK: [i64; 3] = [9800, 9800, 8700];
 
-/// The light level of a face whose outward normal in the viewer's space is `normal`, 14
-/// fraction bits.
+/// The light level of a face whose outward normal in view space is `normal`, 14 fraction bits.
 pub fn lit_level(normal: Vec3) -> usize {
     let normal = normal.map(i64::from);
-    // Of two unit vectors: at most 2^14, but for rounding.
+    // The cosine of two unit vectors: at most 2^14, but for rounding.
     let cosine = |v: [i64; 3]| (0..3).map(|k| normal[k] * v[k]).sum::<i64>() >> 14;
     // The lamp is large: its light reaches a quarter of the radius beyond the terminator.
     let lamp = (cosine(LAMP) + 4096).max(0) * 4 / 5;
-    // Squared, it stays at the rim and leaves a shadow before it.
+    // Squared, the light stays at the rim and leaves a shadow inside it.
     let dusk = cosine(DUSK).max(0).pow(2) >> 14;
     // The 32nd power: a highlight three facets wide.
     let highlight = (0..5).fold(cosine(HALFWAY).max(0), |power, _| (power * power) >> 14);
@@ -264,7 +264,7 @@ pub fn lit_level(normal: Vec3) -> usize {
 mod tests {
     use super::*;
 
-    /// Ten times the usual weights of red, green and blue in brightness.
+    /// Ten times the brightness of a colour, by the usual weights of red, green and blue.
     fn brightness(colour: usize) -> u32 {
         let [r, g, b] = PALETTE[colour].map(u32::from);
         3 * r + 6 * g + b
@@ -309,7 +309,7 @@ mod tests {
     fn the_ball_has_a_highlight_a_dark_side_and_a_rim() {
         let level = |normal: [i64; 3]| lit_level(normal.map(|c| c as i32));
         assert_eq!(level(HALFWAY), LIGHT_LEVELS - 1);
-        // From the middle of the ball down to the right: 0, 45 and 70 degrees.
+        // From the ball's centre down to the right: 0, 45 and 70 degrees.
         let middle = level([0, 0, -16_384]);
         let shadow = level([8192, 8192, -11_585]);
         let rim = level([10_886, 10_886, -5604]);

@@ -1,7 +1,7 @@
-//! A scene by name: its mesh, textures, colours, background and default poses.
+//! A scene with its name: mesh, textures, colours, background and default poses.
 //!
-//! A loaded model is an [`Entry`] as well, so the code that shows scenes does not have to know which scenes are
-//! built in.
+//! A loaded model is an [`Entry`] as well, so the code that draws scenes does not have to know which scenes
+//! are built in.
 
 use core::ops::Deref;
 
@@ -14,12 +14,12 @@ use crate::{LightTable, Mesh, Pose, Scene};
 /// Texels of the largest painted texture: the memory that [`Entry::paint`] borrows.
 pub const MAX_TEXELS: usize = 256 * 256;
 
-/// A scene by name.
+/// A scene with its name.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry<'a> {
     /// Its name: small letters, digits and hyphens.
     pub name: &'static str,
-    /// A line about it, for people.
+    /// A one-line description, for people.
     pub about: &'static str,
     pub(crate) mesh: Mesh<'a>,
     pub(crate) colours: Colours<'a>,
@@ -27,21 +27,21 @@ pub struct Entry<'a> {
     pub(crate) cover: Cover<'a>,
     pub(crate) mipmaps: bool,
     pub(crate) pose: fn(u32) -> Pose,
-    /// By how much nearer all looks the same again, 16.16 units; 0 if it does not.
+    /// The change of distance after which the scene looks the same again, 16.16 units; 0 if it never does.
     pub(crate) tile: i32,
 }
 
-/// The DAC's colours, and what they become in the light.
+/// The DAC's colours, and their lit versions.
 #[derive(Clone, Copy, Debug)]
 pub struct Colours<'a> {
     /// The DAC's colours.
     pub palette: &'a Palette,
-    /// What a texel becomes at a light level.
+    /// The colour of each texel at each light level.
     pub light: &'a LightTable,
 }
 
 impl Colours<'static> {
-    /// Of all that is built in.
+    /// The colours of the built-in scenes.
     pub const BUILT_IN: Self = Self {
         palette: &PALETTE,
         light: &LIGHT_TABLE,
@@ -84,20 +84,20 @@ impl<'t> From<[Texture<'t>; MAX_TEXTURES]> for Textures<'t> {
     }
 }
 
-/// Where an entry's textures come from.
+/// The source of an entry's textures.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Cover<'a> {
-    /// They are painted by code.
+    /// Painted by code.
     Painted(for<'m> fn(&'m mut [u8; MAX_TEXELS]) -> Textures<'m>),
-    /// It is there.
+    /// Loaded with the model.
     Loaded(Texture<'a>),
 }
 
 impl<'a> Entry<'a> {
-    /// The name of a solid that was loaded; no built-in scene has it.
+    /// The name of a loaded model; no built-in scene has it.
     pub const LOADED: &'static str = "model";
 
-    /// A solid that was loaded. It turns as the ball does.
+    /// An entry for a loaded model. It turns as the ball does.
     pub fn loaded(
         mesh: Mesh<'a>,
         texture: Texture<'a>,
@@ -117,7 +117,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// Its textures in full light; what has to be painted is painted into `texels`.
+    /// Returns the textures in full light; `texels` holds the painted ones.
     pub fn paint<'m>(&self, texels: &'m mut [u8; MAX_TEXELS]) -> Textures<'m>
     where
         'a: 'm,
@@ -128,7 +128,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// The scene. `textures` holds what [`Entry::paint`] gave.
+    /// Returns the scene. `textures` are those that [`Entry::paint`] returned.
     pub fn scene<'t>(&self, textures: &'t [Texture<'t>]) -> Scene<'a, 't>
     where
         'a: 't,
@@ -149,11 +149,10 @@ impl<'a> Entry<'a> {
         (self.pose)(tick)
     }
 
-    /// A pose that looks as `next` does, at the distance that is nearest to that of `pose`.
+    /// Returns a pose that looks as `next` does, at the distance nearest to that of `pose`.
     ///
-    /// A walk along tiles goes on from a tile's end at the beginning of the same one. Nothing is seen
-    /// of that in the two pictures; but whoever asks how far it is from one pose to the next would be
-    /// told of a leap back.
+    /// A walk along tiles jumps from the end of a tile back to its start. The two frames do not show the
+    /// jump, but the distance from one pose to the next would.
     pub fn following(&self, pose: &Pose, next: Pose) -> Pose {
         if self.tile == 0 {
             return next;

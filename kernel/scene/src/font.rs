@@ -1,12 +1,11 @@
-//! Letters of five columns by seven rows: for writing on textures, and over pictures.
+//! Letters of five columns by seven rows, for text on textures and over frames.
 
-/// Columns of a letter; the next one begins after a column that is left free.
+/// Columns of a letter; one free column separates letters.
 pub const WIDTH: usize = 5;
 /// Rows of a letter.
 pub const HEIGHT: usize = 7;
 
-/// Every character that is written anywhere. There are no small letters: they are written as
-/// capitals.
+/// Every character that the project writes. Small letters are written as capitals.
 #[rustfmt::skip]
 const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 45] = [
     (b'%', [b"##..#", b"##..#", b"...#.", b"..#..", b".#...", b"#..##", b"#..##"]),
@@ -56,10 +55,10 @@ const GLYPHS: [(u8, [&[u8; WIDTH]; HEIGHT]); 45] = [
     (b'~', [b".....", b".....", b".#...", b"#.#.#", b"...#.", b".....", b"....."]),
 ];
 
-/// A letter's rows, in each the columns as bits, the leftmost the lowest.
+/// A letter's rows. Each bit of a row is a column; the lowest bit is the leftmost.
 pub type Glyph = [u8; HEIGHT];
 
-/// The glyphs of ASCII, small letters as capitals; nothing where there is none.
+/// The glyphs of ASCII, small letters as capitals; empty where no glyph exists.
 static FONT: [Glyph; 128] = {
     let mut font = [[0; HEIGHT]; 128];
     let mut i = 0;
@@ -82,12 +81,12 @@ static FONT: [Glyph; 128] = {
     font
 };
 
-/// The glyph of a character; an empty one if it has none.
+/// Returns the glyph of a character, or an empty one if the font lacks the character.
 pub fn glyph(character: char) -> Glyph {
     FONT.get(character as usize).copied().unwrap_or_default()
 }
 
-/// Whether a character's glyph covers a place, (0, 0) being its top left.
+/// Whether a character's glyph covers a pixel; (0, 0) is the glyph's top left.
 pub(crate) fn covers(character: char, x: i64, y: i64) -> bool {
     let column = 0..WIDTH as i64;
     let row = usize::try_from(y).ok().filter(|&y| y < HEIGHT);

@@ -1,11 +1,10 @@
-//! What is seen: meshes, textures, palette, light, and the camera that looks at them.
+//! Meshes, textures, palette, light, and the camera.
 //!
-//! A picture is a function of scene and pose, and of nothing else: no clock and no history
-//! reaches it. [`Pose::at_tick`] makes the pose of a frame number; [`Stage::draw`] turns it into
-//! polygons in screen space and hands them to the mapper.
+//! A frame is a function of scene, options and pose alone: no clock and no history reaches it.
+//! [`Pose::at_tick`] makes the pose of a frame number. [`Stage::draw`] turns the pose into polygons in screen
+//! space and gives them to the mapper.
 //!
-//! All of it is integers and fixed point, so the same bits come out on the host and on the bare
-//! machine.
+//! All arithmetic is in integers and fixed point, so the host and the bare machine produce the same bits.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -1,14 +1,14 @@
-//! Solids as borrowed slices, so that one built in and one loaded are the same type.
+//! Solids as borrowed slices, so that a built-in solid and a loaded solid have the same type.
 
 use texmap::MAX_SIDES;
 
 use crate::clip::PLANES;
 
-/// Most corners of a face: clipping may add one at each of five planes, and what it makes still
-/// has to be a polygon of at most [`MAX_SIDES`].
+/// Most corners of a face. Clipping may add a corner at each of five planes, and the result must still be a
+/// polygon of at most [`MAX_SIDES`] sides.
 pub const MAX_CORNERS: usize = MAX_SIDES - PLANES;
-/// Largest coordinate of a mesh's vertex, either sign, 16.16: 64 units. Turned any way it stays
-/// below 2^23, and at [`Pose::MAX_DISTANCE`](crate::Pose::MAX_DISTANCE) below 2^24.
+/// Largest coordinate of a mesh's vertex, either sign, 16.16: 64 units. After any turn it is below 2^23, and
+/// at [`Pose::MAX_DISTANCE`](crate::Pose::MAX_DISTANCE) below 2^24.
 pub const MAX_EXTENT: i32 = 64 << 16;
 
 /// A point or direction: x right, y down, z away from the viewer.
@@ -16,11 +16,10 @@ pub type Vec3 = [i32; 3];
 
 /// A corner of a face: a point in space and its place in the texture.
 ///
-/// Faces that share points in space and places in the texture carry one texture over all of
-/// them.
+/// Faces whose common corners have equal texture coordinates carry one texture across their edges.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Corner {
-    /// Which of the mesh's vertices.
+    /// Index into the mesh's vertices.
     pub vertex: u16,
     /// Across the texture, 16.16 texels, 0 to its width.
     pub u: i32,
@@ -31,11 +30,12 @@ pub struct Corner {
 /// A flat convex face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Face {
-    /// Its first corner; the rest follow, clockwise when the face looks at the viewer.
+    /// Index of the face's first corner. The corners follow each other clockwise when the face looks at the
+    /// viewer.
     pub first: u16,
-    /// How many corners, 3 to [`MAX_CORNERS`].
+    /// Number of corners, 3 to [`MAX_CORNERS`].
     pub corners: u16,
-    /// Which of the scene's textures.
+    /// Index into the scene's textures.
     pub texture: u16,
     /// The outward unit normal, 14 fraction bits.
     pub normal: Vec3,
@@ -50,7 +50,7 @@ pub struct Mesh<'a> {
     pub corners: &'a [Corner],
     /// Faces.
     pub faces: &'a [Face],
-    /// Whether none of them can hide a part of another that looks at the viewer, as of a convex solid
-    /// and of a single face. What is not convex has at most [`MAX_FACES`](crate::MAX_FACES).
+    /// Whether no front face can hide a part of another, as in a convex solid or a single face. A mesh that
+    /// is not convex has at most [`MAX_FACES`](crate::MAX_FACES) faces.
     pub convex: bool,
 }

@@ -1,9 +1,9 @@
 //! Smooth noise in integers, for textures drawn by code.
 
-/// One, with the 16 fraction bits of everything here.
+/// One, with the 16 fraction bits of every number here.
 pub const ONE: i64 = 1 << 16;
 
-/// Value noise at a point with 16 fraction bits a cell: 0 to 65 535, smooth over the cells.
+/// Value noise at a point whose cells have 16 fraction bits: 0 to 65 535, smooth across cells.
 pub fn noise(point: [i64; 3], seed: u32) -> i64 {
     let [x, y, z] = point.map(|c| c >> 16);
     // 3t^2 - 2t^3, so that slopes meet at the cells' corners; 0 to 65 535.
@@ -16,8 +16,8 @@ pub fn noise(point: [i64; 3], seed: u32) -> i64 {
     mix(along_y(z), along_y(z + 1), sz)
 }
 
-/// `octaves` octaves of [`noise`], each half as strong and twice as fine, stretched about the
-/// middle, where such sums crowd: 0 to 65 535.
+/// `octaves` octaves of [`noise`], each half as strong and twice as fine. The sum crowds about the middle and
+/// is stretched: 0 to 65 535.
 pub fn fractal(point: [i64; 3], octaves: u32, seed: u32) -> i64 {
     let sum: i64 = (0..octaves)
         .map(|octave| noise(point.map(|c| c << octave), seed + octave) >> (octave + 1))
@@ -25,12 +25,12 @@ pub fn fractal(point: [i64; 3], octaves: u32, seed: u32) -> i64 {
     ((sum - ONE / 2) * 2 + ONE / 2).clamp(0, ONE - 1)
 }
 
-/// From `a` (at `t` = 0) towards `b` (at 65 536).
+/// Interpolates from `a` (at `t` = 0) towards `b` (at 65 536).
 const fn mix(a: i64, b: i64, t: i64) -> i64 {
     a + (((b - a) * t) >> 16)
 }
 
-/// A number without pattern for a cell: 0 to 65 535.
+/// A hash of a cell: 0 to 65 535.
 pub fn hash(cell: [i64; 3], seed: u32) -> i64 {
     let mut h = seed.wrapping_mul(0x9E37_79B9);
     for c in cell {

@@ -1,12 +1,12 @@
 //! The ball's texture, drawn by code: a celestial globe in enamel, gold and silver.
 //!
-//! From the outside in, each layer either has a colour for a texel or leaves it to the next: the
-//! belt of the zodiac, the compass roses on the poles, the wires, the stars, the nebula.
+//! The layers are, from front to back: the belt of the zodiac, the compass roses on the poles, the wires, the
+//! stars, the nebula. Each layer either has a colour for a texel or leaves it to the next layer.
 //!
-//! The nebula is a function of the point on the sphere, not of longitude and polar angle: it has
-//! no seam where the texture closes and no pinch at the poles. Metal is drawn on a grid of
-//! degrees, and every wire has a dark edge, as in cloisonne: it keeps gold readable on any
-//! enamel, and hides the steps of its outline.
+//! The nebula is a function of the point on the sphere, not of longitude and polar angle: it has no seam
+//! where the texture closes and no pinch at the poles. Metal is drawn on a grid of degrees, and every wire
+//! has a dark edge, as in cloisonne: it keeps gold readable on any enamel, and hides the steps of the
+//! outline.
 
 use crate::colour::Ramp;
 use crate::noise::{ONE, fractal, hash};
@@ -14,14 +14,14 @@ use crate::trig::sin;
 
 /// A degree as a fraction of a turn.
 const DEGREE: i64 = (1 << 32) / 360;
-/// Columns of the drawing grid, a texel each: once around.
+/// Columns of the drawing grid, one texel each: once around.
 pub const COLUMNS: u64 = 240;
-/// Rows of the drawing grid, a texel and a degree each: from pole to pole.
+/// Rows of the drawing grid, one texel and one degree each: from pole to pole.
 pub const ROWS: u64 = 180;
 /// Columns from one sign of the zodiac to the next.
 const SIGN: i64 = 20;
 
-/// The twelve signs, Aries first, each 11 columns wide and one apart.
+/// The twelve signs, Aries first, each 11 columns wide, with one column between them.
 const SIGNS: [[&[u8; 71]; 12]; 2] = [
     [
         b".##.....##. #.........# #.........# ...#######. ...####.... #..#..#....",
@@ -56,8 +56,8 @@ const SIGNS: [[&[u8; 71]; 12]; 2] = [
 /// The shade of the dark edge beside metal.
 const EDGE: u8 = Ramp::Indigo.shade(2);
 
-/// The colour of the texel at a longitude, a polar angle up to half a turn, and its point on the
-/// unit sphere (30 fraction bits).
+/// The colour of the texel at a longitude, a polar angle up to half a turn, and the corresponding point on
+/// the unit sphere (30 fraction bits).
 pub fn texel(longitude: u32, polar: u32, point: [i64; 3]) -> u8 {
     let column = ((u64::from(longitude) * COLUMNS) >> 32) as i64;
     let row = ((u64::from(polar) * 2 * ROWS) >> 32) as i64;
@@ -71,17 +71,17 @@ pub fn texel(longitude: u32, polar: u32, point: [i64; 3]) -> u8 {
 /// The belt of the zodiac around the equator.
 fn belt(column: i64, row: i64) -> Option<u8> {
     let (sign, x) = (column / SIGN, column % SIGN);
-    // Half degrees from the equator, downwards: an odd number, as the equator parts two rows.
+    // Half degrees from the equator, downwards: an odd number, since the equator separates two rows.
     let down = 2 * row + 1 - ROWS as i64;
     let from_equator = down.abs();
     let from_meridian = x.min(SIGN - x);
     Some(match from_equator {
         23.. => return None,
         17 | 21 => EDGE,
-        // The upper rim catches the light, the lower one is in its own shadow.
+        // The upper rim catches the light; the lower rim is in its own shadow.
         19 => Ramp::Gold.shade(if down < 0 { 18 } else { 14 }),
         _ if in_sign(sign, x, row) => Ramp::Gold.shade(20),
-        // The sign's shadow on the enamel: it looks raised.
+        // The sign's shadow on the enamel makes it look raised.
         _ if in_sign(sign, x - 1, row) || in_sign(sign, x, row - 1) => Ramp::Rose.shade(2),
         // A lozenge between two signs.
         _ if 4 * from_meridian + from_equator < 9 => {
@@ -92,7 +92,7 @@ fn belt(column: i64, row: i64) -> Option<u8> {
     })
 }
 
-/// Whether a sign's drawing covers a column of its place and a row of the globe.
+/// Whether a sign's drawing covers column `x` of the sign's field and row `row` of the globe.
 fn in_sign(sign: i64, x: i64, row: i64) -> bool {
     let (x, y) = (x - 5, row - (ROWS as i64 / 2 - 6));
     (0..11).contains(&x)
@@ -105,8 +105,8 @@ fn rose(longitude: u32, polar: u32) -> Option<u8> {
     let polar = i64::from(polar);
     // Quarter degrees from the nearer pole.
     let radius = polar.min((1 << 31) - polar) * 4 / DEGREE;
-    // Six long points, and six short ones between: the angle from the axis of each, a whole turn
-    // from one axis to the next.
+    // Six long points, and six short ones between them. Each value is the angle from the point's axis, scaled
+    // so that a whole turn leads from one axis to the next.
     let long = longitude.wrapping_mul(6);
     let short = long.wrapping_add(1 << 31);
     let in_point = |angle: u32, tip: i64, valley: i64| {
@@ -114,7 +114,7 @@ fn rose(longitude: u32, polar: u32) -> Option<u8> {
         let from_axis = i64::from(angle.min(angle.wrapping_neg()) >> 15);
         radius * (valley + (((tip - valley) * from_axis) >> 16)) < tip * valley
     };
-    // Each point has a ridge: one half in the light, the other in the shade.
+    // Each point has a ridge: one half is lit, the other is in shade.
     let half = |angle: u32, lit, shaded| if angle >> 31 == 1 { lit } else { shaded };
     Some(match radius {
         112.. => return None,
@@ -130,14 +130,14 @@ fn rose(longitude: u32, polar: u32) -> Option<u8> {
 
 /// Six gold meridians, and the path of the moon in silver.
 fn wire(longitude: u32, polar: u32, point: [i64; 3]) -> Option<u8> {
-    // Through the middle of the lozenges, which is the middle of a column.
+    // Through the centre of the lozenges, which is the middle of a column.
     let from_first = i64::from(longitude) - 3 * DEGREE / 4;
     let from_nearest = (from_first + 30 * DEGREE).rem_euclid(60 * DEGREE) - 30 * DEGREE;
-    // Away from the equator the same angle is a shorter way: wires keep their width. The product
+    // Away from the equator the same angle spans a shorter distance: this keeps the wires' width. The product
     // is at most 2^29 (30 degrees and less) x 2^30.
     let meridian = (from_nearest.abs() * sin(polar)) >> 30;
-    // The plane through the centre with the normal (0, 4, 3) / 5, tipped by 37 degrees; 7 / 11
-    // is about 2 / pi, which makes a sine with 30 fraction bits a part of 2^32 to a turn.
+    // The plane through the centre with the normal (0, 4, 3) / 5, tipped by 37 degrees. 7 / 11 is about 2 /
+    // pi, which converts a sine with 30 fraction bits to a fraction of a turn in 32 bits.
     let moon = (point[1] * 4 + point[2] * 3).abs() * 7 / (5 * 11);
     let half_width = 3 * DEGREE / 4;
     if meridian < half_width {
@@ -151,11 +151,11 @@ fn wire(longitude: u32, polar: u32, point: [i64; 3]) -> Option<u8> {
     }
 }
 
-/// The stars: one in each cell of 10 columns and 12 rows, somewhere, so that they neither
-/// cluster nor line up; a quarter of them are large.
+/// The stars: one at a random place in each cell of 10 columns and 12 rows, so that they neither cluster nor
+/// line up. A quarter of them are large.
 fn star(column: i64, row: i64) -> Option<u8> {
     let random = hash([column / 10, row / 12, 0], 77);
-    // A column and row from the cell's border: a large star does not reach over it.
+    // At least one column and row from the cell's border: a large star does not cross it.
     let (x, y) = (1 + random % 8, 1 + random / 8 % 10);
     let size = (random >> 8) % 4;
     match (column % 10 - x).abs() + (row % 12 - y).abs() {
@@ -165,20 +165,20 @@ fn star(column: i64, row: i64) -> Option<u8> {
     }
 }
 
-/// Clouds of light: noise, looked up where other noise has pushed the point. The push is what
-/// turns blots into swirls.
+/// Clouds of light: noise, looked up at a point that other noise has displaced. The displacement turns blots
+/// into swirls.
 fn nebula(point: [i64; 3]) -> u8 {
     // A cell of the coarsest noise is a third of the ball's width.
     let place = point.map(|c| (c * 3) >> 15);
     let push = [10, 20, 30].map(|seed| fractal(place, 2, seed) - ONE / 2);
     let pushed = [0, 1, 2].map(|k| place[k] + 2 * push[k]);
     let cloud = fractal(pushed, 5, 40);
-    // Where noise crosses its middle, a line; its third power, a thin one.
+    // A line where noise crosses its middle; the third power makes the line thin.
     let ridge = ONE - (2 * fractal(pushed.map(|c| c / 2), 4, 50) - ONE).abs();
     let filament = (((ridge * ridge) >> 16) * ridge) >> 16;
     // 3 to 20: never black, and room for the highlight.
     let shade = (3 * ONE + 9 * cloud + 9 * filament) >> 16;
-    // The push is slow, so hue changes slowly; a little of the cloud frays the borders.
+    // The displacement changes slowly, so the hue does; a little of the cloud frays the borders.
     let ramp = match ((push[0] + ONE / 2 + cloud / 4) * 5) >> 16 {
         ..1 => Ramp::Rose,
         1 => Ramp::Violet,
@@ -218,7 +218,7 @@ mod tests {
         ])
     }
 
-    /// Nearby points are at most a shade apart, and that seldom; a hue may change there.
+    /// Nearby points differ by at most one shade, and rarely; a hue may change there.
     fn near(a: u8, b: u8) -> bool {
         let shade = |colour| usize::from(colour - Ramp::Violet.shade(0)) % SHADES;
         shade(a).abs_diff(shade(b)) <= 1

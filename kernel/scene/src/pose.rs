@@ -1,17 +1,17 @@
-//! Where the solid is and how it is turned.
+//! Position and orientation of the solid.
 
 use crate::Vec3;
 use crate::trig::{cos, mul, sin};
 
-/// How the solid lies: three angles and a distance.
+/// The solid's pose: three angles and a distance.
 ///
-/// Angles are 32-bit fractions of a turn, so the step from 2^32 - 1 to 0 is as small as any
-/// other. The orientation is always rebuilt from them and never multiplied on: nothing drifts.
+/// Angles are 32-bit fractions of a turn, so the step from 2^32 - 1 to 0 is as small as any other. The
+/// orientation is always rebuilt from the angles and never accumulated, so nothing drifts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pose {
     /// About the solid's own axis (y), applied first.
     pub yaw: u32,
-    /// About the screen's horizontal, applied second: tips the axis to or from the viewer.
+    /// About the screen's horizontal, applied second: tips the axis towards or away from the viewer.
     pub pitch: u32,
     /// About the line of sight, applied last: leans the axis to the side.
     pub roll: u32,
@@ -29,21 +29,21 @@ impl Pose {
     /// Ticks of a whole turn: 12 s.
     const TURN: u32 = 720;
 
-    /// The default pose at a tick: a steady turn about an axis tipped and leant like a globe's.
+    /// The default pose at a tick: a steady turn about an axis that is tipped and leaning like a globe's.
     pub fn at_tick(tick: u32) -> Self {
         Self {
             yaw: tick
                 .wrapping_mul(((1u64 << 32) / Self::TURN as u64) as u32)
                 .wrapping_neg(),
-            // The rose on the upper pole is seen, and the belt still is.
+            // Shows the rose on the upper pole, and still the belt.
             pitch: 28 * DEGREE,
             roll: 18 * DEGREE,
-            // A silhouette of 93 pixels of the 120 from the middle to the edge.
+            // The silhouette's radius is 93 pixels, of 120 from the screen's centre to its edge.
             distance: 295 * (1 << 16) / 100,
         }
     }
 
-    /// The rotation that the three angles make.
+    /// The rotation of the three angles.
     pub fn orientation(&self) -> Orientation {
         let (sy, cy) = (sin(self.yaw), cos(self.yaw));
         let (sp, cp) = (sin(self.pitch), cos(self.pitch));
@@ -75,7 +75,7 @@ pub struct Orientation {
 }
 
 impl Orientation {
-    /// Turns a point or direction; any number of fraction bits goes through, rounded to nearest.
+    /// Turns a point or direction, rounded to nearest. The result has the same number of fraction bits.
     pub fn turn(&self, v: Vec3) -> Vec3 {
         let v = v.map(i64::from);
         self.rows.map(|row| {
@@ -84,7 +84,7 @@ impl Orientation {
         })
     }
 
-    /// Turns a direction the other way: from the viewer's axes into the solid's.
+    /// Turns a direction back, from the viewer's axes to the solid's.
     pub fn turn_back(&self, v: Vec3) -> Vec3 {
         let v = v.map(i64::from);
         [0, 1, 2].map(|column| {
@@ -110,7 +110,7 @@ mod tests {
                         .map(|(&a, &b)| i128::from(a) * i128::from(b))
                         .sum();
                     let expected = if i == j { 1i128 << 60 } else { 0 };
-                    // Congruent within 2^-16, by far.
+                    // Congruent within 2^-16, with a wide margin.
                     assert!(
                         (dot - expected).abs() < 1 << 36,
                         "tick {tick}, rows {i} and {j}"

@@ -1,4 +1,4 @@
-//! A scene made ready, and the way from a pose to polygons.
+//! The scene renderer: prepares a scene's textures, and turns a pose into polygons.
 
 mod errors;
 pub mod motion;
@@ -14,20 +14,21 @@ use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
 
 /// Most vertices of a mesh.
 pub const MAX_VERTICES: usize = 4096;
-/// Most faces of a mesh that is not convex: each is known by a number until the picture is drawn.
+/// Most faces of a mesh that is not convex. Such a mesh's faces keep their numbers until the frame is drawn.
 pub const MAX_FACES: usize = 8192;
-/// Column jobs that are collected before they are drawn.
+/// Most jobs that are collected before they are drawn.
 pub const MAX_JOBS: usize = 4096;
-/// Room for a scene's textures, each padded and once per light level: one of the largest.
+/// Room for a scene's textures, padded, with a copy for each light level: one texture of the largest size.
 pub const SURFACE_BYTES: usize = 3 << 19;
-/// Most textures of a scene, a mipmap counted as one.
+/// Most textures of a scene. Each mipmap counts as a texture.
 const MAX_TEXTURES: usize = 16;
-/// Textures made of one that has mipmaps: itself, and down to a sixty-fourth of its sides.
+/// Mipmaps of a texture: the texture itself, and copies down to 1/64 of its sides.
 const MIPMAPS: usize = 7;
 
-/// What is seen: a solid, what covers it, and the colours of everything.
+/// A mesh with its textures, colours and background.
 ///
-/// `'t` is the textures' life: a stage makes its own lit copies and needs them no longer.
+/// `'t` is the textures' lifetime. A stage makes its own lit copies, so the textures need not outlive
+/// [`Stage::set`].
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a, 't> {
     /// Name, for people.
@@ -38,16 +39,16 @@ pub struct Scene<'a, 't> {
     pub textures: &'t [Texture<'t>],
     /// The DAC's colours.
     pub palette: &'a Palette,
-    /// What a colour becomes at a light level.
+    /// The colour that each colour becomes at each light level.
     pub light: &'t LightTable,
-    /// The colour of each scan line where there is no solid.
+    /// The colour of each scan line where no solid covers it.
     pub background: &'a [u8; HEIGHT],
-    /// Whether the textures need smaller copies for what is far away. Their sides are powers of two
-    /// then, or their tiles'.
+    /// Whether the textures need smaller copies for distant faces. If so, the sides of the textures, or of
+    /// their tiles, are powers of two.
     pub mipmaps: bool,
 }
 
-/// The fixed arenas that drawing works in.
+/// Fixed arenas for drawing.
 #[derive(Clone, Copy, Debug)]
 pub struct Storage {
     surfaces: [u8; SURFACE_BYTES],
@@ -57,7 +58,7 @@ pub struct Storage {
 }
 
 impl Storage {
-    /// Empty arenas. About 3 MiB: meant for a static.
+    /// Empty arenas, about 3 MiB: intended for a static.
     pub const fn new() -> Self {
         Self {
             surfaces: [0; SURFACE_BYTES],
@@ -74,18 +75,18 @@ impl Default for Storage {
     }
 }
 
-/// Where a texture's lit copies are: one for each light level, one after the other.
+/// The place of a texture's lit copies: one copy for each light level, one after the other.
 #[derive(Clone, Copy, Debug, Default)]
 struct Surface {
     first: usize,
     width: u16,
     height: u16,
-    /// Of a tiled texture.
+    /// Columns and rows of the tile, if the texture is tiled.
     tile: Option<(u16, u16)>,
 }
 
 impl Surface {
-    /// The copy of a light level.
+    /// The copy for a light level.
     fn lit<'t>(&self, level: usize, texels: &'t [u8; SURFACE_BYTES]) -> Texture<'t> {
         let (width, height) = (self.width, self.height);
         let len = self.texels();
@@ -97,18 +98,18 @@ impl Surface {
         texture.expect("a lit copy has the sides of its texture")
     }
 
-    /// Texels of a copy.
+    /// Texels of one copy, padding included.
     fn texels(&self) -> usize {
         let (width, height) = self.sides();
         Texture::padded_len(width, height)
     }
 
-    /// How many there are across and down.
+    /// Texels that are stored across and down: the tile's, or the texture's.
     fn sides(&self) -> (u16, u16) {
         self.tile.unwrap_or((self.width, self.height))
     }
 
-    /// The half of each side, one texel at least, and what is half as large.
+    /// The texture with each side halved `times` times; a side is at least one texel.
     fn halved(self, times: usize) -> Self {
         let part = |side: u16| (side >> times).max(1);
         Self {
@@ -122,21 +123,21 @@ impl Surface {
 
 /// A scene with its textures lit.
 ///
-/// Light would cost the mapper a second look-up for every pixel. A face has one light level, so
-/// each texture is run through the light table once per level when the scene is set, and a face
-/// takes the copy that fits: the mapper's loop knows nothing of light.
+/// Light in the mapper would cost a second look-up for every pixel. A face has one light level, so
+/// [`Stage::set`] runs each texture through the light table once per level, and a face uses the copy for its
+/// level. The mapper's loop needs no light.
 #[derive(Debug)]
 pub struct Stage<'a> {
     name: &'static str,
     mesh: Mesh<'a>,
     palette: &'a Palette,
     background: &'a [u8; HEIGHT],
-    /// Textures made of each of the scene's.
+    /// Mipmaps of each texture of the scene.
     mipmaps: usize,
     mapper: Mapper,
     order: Order,
-    /// The pose a tick later, where quality is lower while the solid moves, and faces of the last
-    /// picture that were drawn so.
+    /// The pose one tick later, if quality is reduced in motion; and how many faces of the last frame were
+    /// drawn in reduced quality.
     next: Option<Pose>,
     lowered: u32,
     /// Half the shortest period of the textures, 16.16 texels.
@@ -181,14 +182,13 @@ impl<'a> Stage<'a> {
         stage
     }
 
-    /// Puts another scene on the stage, its textures lit.
+    /// Replaces the scene, and lights its textures.
     ///
     /// # Panics
-    /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices, or, if the mesh is
-    /// not convex, [`MAX_FACES`] faces, or textures
-    /// of more than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together, each padded to powers of
-    /// two. If a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further
-    /// out than [`MAX_EXTENT`].
+    /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices; for a mesh that is not
+    /// convex, more than [`MAX_FACES`] faces; more than 16 textures, each mipmap counted; or textures of more
+    /// than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`] texels together, each padded to powers of two. If a face has
+    /// fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further out than [`MAX_EXTENT`].
     pub fn set(&mut self, scene: Scene<'a, '_>) {
         self.mipmaps = if scene.mipmaps { MIPMAPS } else { 1 };
         let (vertices, textures) = (
@@ -287,50 +287,52 @@ impl<'a> Stage<'a> {
         self.palette
     }
 
-    /// The colour of each scan line where there is no solid.
+    /// The colour of each scan line where no solid covers it.
     pub fn background(&self) -> &'a [u8; HEIGHT] {
         self.background
     }
 
-    /// A texture in the light of a face, by the number that [`Face`] has.
+    /// The lit texture with the number in a polygon's [`Face`].
     pub fn surface(&self, number: u16) -> Texture<'_> {
         lit(&self.surfaces, self.texels, number)
     }
 
-    /// How pictures are mapped.
+    /// The mapper of the next frames.
     pub fn mapper(&self) -> Mapper {
         self.mapper
     }
 
-    /// Has the next pictures mapped in another way.
+    /// Sets the mapper of the next frames.
     pub fn set_mapper(&mut self, mapper: Mapper) {
         self.mapper = mapper;
     }
 
-    /// In which order a picture's runs are drawn.
+    /// The order in which a frame's spans are drawn.
     pub fn order(&self) -> Order {
         self.order
     }
 
-    /// Has the next pictures' runs drawn in another order.
+    /// Sets the order in which the spans of the next frames are drawn.
     pub fn set_order(&mut self, order: Order) {
         self.order = order;
     }
 
-    /// Has the next pictures drawn in lower quality where their motion hides it, until this is called
-    /// again: `next` is the pose that comes a tick after the one that is drawn. Returns what was set
-    /// before.
+    /// Draws the next frames in reduced quality where motion hides the difference, until the next call.
+    /// `next` is the pose one tick after the drawn pose; `None` restores full quality. Returns the previous
+    /// setting.
     pub fn lower_for(&mut self, next: Option<Pose>) -> Option<Pose> {
         core::mem::replace(&mut self.next, next)
     }
 
-    /// Faces of the last picture that were drawn in lower quality.
+    /// Faces of the last frame that were drawn in reduced quality.
     pub fn lowered(&self) -> u32 {
         self.lowered
     }
 
-    /// Draws the solid in `pose` on a destination that holds the background. At a distance outside
-    /// 0 to [`Pose::MAX_DISTANCE`] every face is dropped; at any other none is.
+    /// Draws the solid in `pose` on a destination that contains the background.
+    ///
+    /// At a distance outside 0 to [`Pose::MAX_DISTANCE`] every face is dropped. At other distances a face is
+    /// dropped only if clipping leaves it too many corners.
     pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
         if !self.mesh.convex {
             self.find_visible(pose);
@@ -372,7 +374,7 @@ impl<'a> Stage<'a> {
         stats
     }
 
-    /// Finds out which of the mesh's faces, of at most [`MAX_FACES`], is seen at each pixel.
+    /// Finds the visible face at each pixel, for a mesh of at most [`MAX_FACES`] faces.
     pub fn find_visible(&mut self, pose: &Pose) -> &Visible<MAX_FACES> {
         self.visible.clear();
         polygons(
@@ -382,7 +384,7 @@ impl<'a> Stage<'a> {
             pose,
             |number, face| {
                 if let Some(face) = face {
-                    // What is out of range here is so again for the mapper, which counts it.
+                    // A face out of range is out of range for the mapper too, which counts it.
                     let _ = self.visible.add(number, &face);
                 }
             },
@@ -391,8 +393,8 @@ impl<'a> Stage<'a> {
         self.visible
     }
 
-    /// Gives `sink` the faces that look at the viewer, in the mesh's order, each with its number
-    /// there; nothing for a face that is dropped.
+    /// Passes the front faces to `sink` in the mesh's order, each with its number in the mesh. `sink`
+    /// receives `None` for a dropped face.
     pub fn polygons(&mut self, pose: &Pose, sink: impl FnMut(u16, Option<Face<'_>>)) {
         polygons(&self.mesh, self.mipmaps, self.points, pose, sink);
     }
@@ -408,7 +410,7 @@ fn lit<'t>(
     surfaces[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, texels)
 }
 
-/// The faces that look at the viewer, in the mesh's order, each with its number there.
+/// Passes the front faces to `sink` in the mesh's order, each with its number in the mesh.
 fn polygons(
     mesh: &Mesh<'_>,
     mipmaps: usize,
@@ -444,7 +446,8 @@ fn polygons(
                 (vertex.u, vertex.v) = (vertex.u >> mip, vertex.v >> mip);
             }
             let surface = (usize::from(face.texture) * mipmaps + mip) * LIGHT_LEVELS + level;
-            // Far from each other, so that of a face with many corners they are not on a line.
+            // A third of the corners apart, so that the anchors of a face with many corners do not lie on a
+            // line.
             let anchors = [0, corners.len() / 3, 2 * corners.len() / 3].map(|i| Anchor {
                 position: points[usize::from(corners[i].vertex)].view(),
                 u: corners[i].u >> mip,
@@ -461,8 +464,8 @@ fn polygons(
     }
 }
 
-/// The colour that comes nearest to the mean of a block of `size` texels, the one in column and row
-/// `place` of such blocks. It is one that light can move.
+/// The colour nearest to the mean of a block of `size` texels. `place` is the block's column and row, counted
+/// in blocks. The result is a material's colour, which light can change.
 fn mean(texture: &Texture<'_>, place: (u16, u16), size: (u16, u16), palette: &Palette) -> u8 {
     let mut sum = [0; 3];
     for j in 0..size.1 {
@@ -485,16 +488,16 @@ fn mean(texture: &Texture<'_>, place: (u16, u16), size: (u16, u16), palette: &Pa
     MATERIALS.min_by_key(distance).unwrap_or(0) as u8
 }
 
-/// The mipmap, of so many, that a polygon takes: the one of which a pixel along the side that has
-/// most texels to a pixel gets one, within the square root of two.
+/// The mipmap, of `mipmaps`, that a polygon uses. Along the side with the most texels to a pixel, a pixel
+/// covers one texel of that mipmap, within a factor of the square root of two.
 ///
-/// That is the direction which would show a moire pattern; across it the mipmap is smoother than it
-/// had to be.
+/// The direction of that side would show a moire pattern; across it the mipmap is smoother than necessary.
 fn mipmap(polygon: &[Vertex], mipmaps: usize) -> usize {
     let mut mip = 0;
     for (i, a) in polygon.iter().enumerate() {
         let b = &polygon[(i + 1) % polygon.len()];
-        // 1/256 texel, below 2^17, and 1/256 pixel, below 2^25. Within a pixel nothing is to be seen.
+        // In 1/256 texel, below 2^17, and 1/256 pixel, below 2^25. A side shorter than a pixel counts as one
+        // pixel: no detail is visible there.
         let square = |x: i32, y: i32| i64::from(x).pow(2) + i64::from(y).pow(2);
         let texels = square((b.u - a.u) >> 8, (b.v - a.v) >> 8);
         let pixels = square(b.x - a.x, b.y - a.y).max(1 << 16);
@@ -505,10 +508,10 @@ fn mipmap(polygon: &[Vertex], mipmaps: usize) -> usize {
     mip
 }
 
-/// Whether the snapped polygon is wound clockwise on the screen (y down): its front.
+/// Whether the snapped polygon is wound clockwise on the screen (y down): a front face.
 ///
-/// The snapped area decides, not the normal: what is drawn is the snapped polygon, and a face
-/// seen edge-on may have turned over in the snapping. What clipping left nothing of has no area.
+/// The snapped area decides, not the normal: the snapped polygon is what is drawn, and snapping may turn over
+/// a face that is seen edge-on. A face that clipping removed has no area.
 fn looks_at_viewer(polygon: &[Vertex]) -> bool {
     let mut area = 0i64;
     for (i, a) in polygon.iter().enumerate() {

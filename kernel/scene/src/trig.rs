@@ -1,10 +1,9 @@
 //! Sine and cosine of angles given as 32-bit fractions of a turn.
 //!
-//! Polynomials, not a table: a pose needs six values. The turn is folded into an eighth, where
-//! Taylor's series to the ninth power (sine) and the tenth (cosine) leave less than 1.8e-9 out,
-//! two units of the result's 30 fraction bits; rounding adds as much again. Folding makes the
-//! quarter turns exact and keeps the four quadrants mirror images, so a solid turned by 90
-//! degrees is the same solid.
+//! Polynomials, not a table: a pose needs six values. The turn is folded into an eighth. There the Taylor
+//! series to the ninth power (sine) and the tenth (cosine) have an error below 1.8e-9, two units of the
+//! result's 30 fraction bits; rounding adds as much again. Folding makes the quarter turns exact and keeps
+//! the four quadrants mirror images, so a solid turned by 90 degrees is the same solid.
 
 /// One, with the 30 fraction bits of every result here.
 pub const ONE_Q30: i64 = 1 << 30;
@@ -42,7 +41,7 @@ const fn first_quarter_cos(angle: u32) -> i64 {
     }
 }
 
-/// Up to an eighth of a turn, in radians with 30 fraction bits.
+/// Converts an angle of up to an eighth of a turn to radians with 30 fraction bits.
 const fn radians(angle: u32) -> i64 {
     // angle / 2^30 quarter turns x pi/2: 30 + 61 fraction bits, rounded to 30.
     ((angle as i128 * HALF_PI_Q61 + (1 << 60)) >> 61) as i64

@@ -1,5 +1,5 @@
-//! Whole solids at every distance: nothing dropped, and from inside no pixel left out or written
-//! twice. What a sweep of solids finds is pasted in here.
+//! Whole solids at every distance: nothing is dropped, and from inside no pixel is left out or written twice.
+//! Failures that a sweep of solids finds are pasted in here.
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::solid::{Checker, Compared, Count, Mix, Solid, length, pose};
@@ -35,7 +35,7 @@ fn at_every_distance_nothing_is_dropped() {
     }
 }
 
-/// Tries so many cases of a mix; panics with a test to paste.
+/// Runs `cases` cases of a mix; panics with a test to paste.
 fn sweep(mix: Mix, cases: usize) -> Compared {
     let seed = seeded::generator().get_seed();
     let mut checker = Checker::default();
@@ -71,7 +71,7 @@ fn closed_solids_have_no_gap_from_outside_and_no_double_but_in_a_fold() {
     for mix in [Mix::Ball, Mix::Cube, Mix::Octahedron] {
         let compared = sweep(mix, 300);
         assert!(!seeded::is_whole() || compared.pixels > 200_000);
-        // One in some ten thousand poses has one.
+        // One in some ten thousand poses has a fold with a pixel.
         assert!(compared.folds <= 3);
     }
 }
@@ -110,7 +110,7 @@ fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
         for above in [128, 129, 256, 257, 512, unit / 256 * 3] {
             assert_eq!(looking_on(above, roll), (1, (0, 0)), "{above} above");
         }
-        // Nearer than the near plane: nothing of the face is left.
+        // Nearer than the near plane, the whole face is cut away.
         assert_eq!(looking_on(127, roll), (0, (WIDTH * HEIGHT, 0)));
     }
 }
@@ -137,13 +137,13 @@ fn beyond_the_limits_all_is_dropped_and_counted() {
         let stats = count.draw(&mut storage, &cube, &pose);
         assert_eq!(stats.dropped, dropped, "distance {distance}");
         let (gaps, doubles) = count.gaps_and_doubles();
-        // At the furthest the cube is some four pixels wide; from inside it shows no face.
+        // At the largest distance the cube is some four pixels wide; from inside it shows no face.
         let empty = dropped > 0 || distance < 2;
         assert_eq!((gaps == WIDTH * HEIGHT, doubles), (empty, 0));
     }
 }
 
-/// Such a face is no legal one; it must do no harm.
+/// Such a face is not legal, but it must do no harm.
 #[test]
 fn a_zigzag_that_clipping_gives_too_many_corners_is_dropped_and_counted() {
     let mut storage = in_place::boxed!(Storage);

@@ -5,8 +5,9 @@ use oracle::solid::pose;
 use scene::Storage;
 use texmap::{Mapper, Order};
 
-/// At every pixel the nearest face, written once, in `poses` poses by each of some mappers. A limit on
-/// the cases limits the solids as well, to any of them.
+/// Checks that each pixel shows the nearest face and is written once, in `poses` poses with each of some
+/// mappers. A limit on the number of cases also limits the number of solids; the solids are then chosen at
+/// random.
 fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
     let poses = seeded::cases(poses);
     let mut random = seeded::generator();
@@ -30,7 +31,7 @@ fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
             "{name}: {pixels} pixels, {contested} of them covered more than once, {borders} borders \
              down the columns, {ties} ties within 2^-40"
         );
-        // With so many poses some part of each is behind another.
+        // With so many poses some part of each solid is behind another.
         assert!(contested > 0 || poses < 6, "{name} hides nothing");
         let large = solid.extent() > 1 << 22;
         assert!(
@@ -45,7 +46,7 @@ fn the_nearest_face_is_seen_and_written_once() {
     hidden(6, &[(Mapper::default(), Order::Polygons)]);
 }
 
-/// Runs that lie in rows, or in neither, are cut as well.
+/// Spans in rows, and spans in any direction, are cut as well.
 #[test]
 fn it_is_so_by_every_mapper_in_every_order() {
     let all = Mapper::ALL.iter().enumerate();

@@ -1,10 +1,10 @@
-//! The moire pattern of the corridor, measured: how much it shimmers, with mipmaps and without.
+//! Measures the moire pattern of the corridor: how much it shimmers, with mipmaps and without.
 //!
-//! A pixel ought to show the mean of what it covers: here that of 8 x 8 places in it, in the textures
-//! as they are, by the planes' quotients. What a picture is off by changes from one picture to the next
-//! where texels are left out, now these and now those; that change is what is seen to crawl. Its mean
-//! square is the energy. What stays, as the hue of a mean that the palette does not have, is no part
-//! of it.
+//! A pixel should show the mean of the area that it covers. Here that is the mean of 8 x 8 samples in the
+//! pixel, in the full-size textures, by the planes' quotients. Where texels are left out, a frame's error
+//! changes from one frame to the next, as different texels are left out each time; the eye sees that change
+//! as crawling. The mean square of the change is the energy. An error that stays, such as the hue of a mean
+//! that the palette lacks, does not count.
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::depth::nearest;
@@ -13,7 +13,7 @@ use scene::{Pose, Stage, Storage};
 use texmap::plane::Form;
 use texmap::{Mapper, Plane};
 
-/// Places across a pixel, and down.
+/// Samples across a pixel, and down.
 const PLACES: i64 = 8;
 
 /// Calls `look` with a scene's stage.
@@ -25,8 +25,8 @@ fn on_stage<T>(name: &str, look: impl FnOnce(&Entry<'_>, &mut Stage<'_>) -> T) -
     look(entry, &mut Stage::new(&mut storage, entry.scene(&textures)))
 }
 
-/// What each pixel that covers more than two texels shows in the mean of its places, red, green and blue,
-/// 0 to 63. Of others hardly a texel is left out.
+/// For each pixel that covers more than two texels, the mean of its samples: red, green and blue, 0 to 63. In
+/// other pixels hardly a texel is left out.
 fn means(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
     let seen = nearest(stage, pose);
     let mut faces = Vec::new();
@@ -73,7 +73,7 @@ fn means(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
     means
 }
 
-/// What each covered pixel's colour is off.
+/// The colour error of each covered pixel.
 fn errors(stage: &mut Stage<'_>, pose: &Pose, means: &[Option<[f64; 3]>]) -> Vec<Option<[f64; 3]>> {
     let mut page = PlanarBuffer::new();
     stage.set_mapper(Mapper::Exact);

@@ -1,4 +1,4 @@
-//! The renderer's scans against the oracle.
+//! Checks the renderer's scans against the oracle.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -8,13 +8,13 @@ use texmap::{MAX_SIDES, Point};
 
 use crate::coverage::{Area, Pixels, Row};
 
-/// What a case of a sweep consists of.
+/// A case of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Case {
-    /// Each is checked for itself.
+    /// The polygons. Each is checked separately.
     pub polygons: Vec<Vec<Point>>,
-    /// If there is one, the polygons fill it: each pixel inside belongs to exactly one of them,
-    /// and none to any outside. It may have more sides than the renderer takes.
+    /// If present, the polygons fill this outline: each pixel inside belongs to exactly one of them, and no
+    /// pixel outside belongs to any. The outline may have more sides than the renderer accepts.
     pub outline: Option<Vec<Point>>,
 }
 
@@ -27,17 +27,17 @@ pub enum Scan {
     Rows,
 }
 
-/// What is wrong with a case.
+/// A reason why a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wrong {
     /// The polygon was dropped.
     Dropped(Scan, Dropped),
-    /// The renderer panicked (an overflow, say).
+    /// The renderer panicked (an overflow, for example).
     Panicked,
-    /// A run that is empty, out of order, overlaps the one before, or has a pixel further out
-    /// than the ones around the polygon, or outside the screen.
+    /// A span is empty, out of order, overlaps the previous span, or has a pixel outside the screen or beyond
+    /// the ring of pixels around the polygon.
     Misplaced(Scan, Run),
-    /// The pixel is inside by the scan and not by the oracle, or the other way round.
+    /// Scan and oracle disagree about whether the pixel is inside.
     Pixel {
         /// The scan that differs.
         scan: Scan,
@@ -45,12 +45,12 @@ pub enum Wrong {
         x: i32,
         /// The pixel's row.
         y: i32,
-        /// What the oracle says.
+        /// The oracle's answer.
         inside: bool,
     },
-    /// The runs without crossings are others than those with them.
+    /// The spans without crossings differ from the spans with crossings.
     Spans(Axis),
-    /// Two polygons of the case have the pixel.
+    /// Two polygons of the case contain the pixel.
     Twice(i32, i32),
     /// The pixel is in the outline and in no polygon, or in a polygon and not in the outline.
     Gap(i32, i32),
@@ -88,22 +88,22 @@ impl fmt::Display for Wrong {
 
 impl std::error::Error for Wrong {}
 
-/// Checks cases; it has the memory for that.
+/// Checks cases, and owns the memory for that.
 #[derive(Debug, Default)]
 pub struct Checker {
     oracle: Pixels,
     scanned: Pixels,
     union: Pixels,
-    /// Line, first pixel and length of each run.
+    /// Line, first pixel and length of each span.
     runs: Vec<(u16, u16, u16)>,
 }
 
 impl Checker {
-    /// Checks a case, and says how many pixels were compared: for each polygon, all that meet
-    /// its bounding box on the screen and those around them.
+    /// Checks a case, and returns the number of compared pixels: for each polygon, all pixels of the screen
+    /// that meet its bounding box, and the pixels around them.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first error found.
     pub fn case(&mut self, case: &Case) -> Result<u64, Wrong> {
         let Some(outline) = &case.outline else {
             return case.polygons.iter().map(|p| self.polygon(p)).sum();
@@ -132,16 +132,16 @@ impl Checker {
         }
     }
 
-    /// Checks a polygon, and says how many pixels were compared.
+    /// Checks a polygon, and returns the number of compared pixels.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first error found.
     pub fn polygon(&mut self, polygon: &[Point]) -> Result<u64, Wrong> {
         debug_assert!(polygon.len() <= MAX_SIDES);
         let area = Area::around(polygon);
         self.oracle.cover(polygon, &area);
         for scan in [Scan::Columns, Scan::Rows] {
-            // A panic is a failure like another, to be shrunk and printed.
+            // A panic counts as a failure, so that the case is shrunk and printed.
             catch_unwind(AssertUnwindSafe(|| self.scan(polygon, &area, scan)))
                 .unwrap_or(Err(Wrong::Panicked))?;
             if let Some((x, y)) = difference(&self.oracle, &self.scanned, &area) {
@@ -155,7 +155,7 @@ impl Checker {
         Ok(area.pixels())
     }
 
-    /// Compares the runs that come without crossings with those that come with them.
+    /// Compares the spans without crossings to the spans with crossings.
     fn spans(&mut self, polygon: &[Point], axis: Axis) -> Result<(), Wrong> {
         let mut runs = std::mem::take(&mut self.runs);
         runs.clear();
@@ -176,7 +176,7 @@ impl Checker {
         }
     }
 
-    /// Fills `scanned` by one of the renderer's scans.
+    /// Fills `scanned` with one of the renderer's scans.
     fn scan(&mut self, polygon: &[Point], area: &Area, scan: Scan) -> Result<(), Wrong> {
         let scanned = &mut self.scanned;
         scanned.clear(area);
@@ -184,7 +184,7 @@ impl Checker {
             Scan::Columns => (&area.x, &area.y),
             Scan::Rows => (&area.y, &area.x),
         };
-        // Where the next run may begin, at the earliest.
+        // The earliest place where the next span may begin.
         let mut free = (lines.start, cells.start);
         let mut wrong = None;
         let sink = |run: Run| {
@@ -198,7 +198,7 @@ impl Checker {
             free = (line, end);
             match scan {
                 Scan::Columns => {
-                    // Only the run's ends; what lies between is filled in below.
+                    // Only the span's ends; the pixels between are filled in below.
                     let (word, bit) = (line as usize / 64, 1 << (line % 64));
                     scanned.row_mut(first)[word] ^= bit;
                     if end < cells.end {

@@ -1,7 +1,7 @@
 //! Which pixels of the screen are inside a polygon.
 //!
-//! Range: coordinates within +-2^30. Differences are then at most 2^31 and products 2^62, so all
-//! of it is exact in 64 bits; the renderer's own limit is 2^23.
+//! Range: coordinates within +-2^30. Differences are then at most 2^31 and products 2^62, so all arithmetic
+//! is exact in 64 bits; the renderer's own limit is 2^23.
 
 use std::ops::Range;
 
@@ -12,14 +12,14 @@ pub const WIDTH: i32 = 320;
 /// Rows of the screen.
 pub const HEIGHT: i32 = 240;
 
-/// The definition, word for word: inside when an odd number of edges have `ymin <= yc < ymax`
-/// and cross yc at `x <= xc`.
+/// The definition, word for word: inside when an odd number of edges have `ymin <= yc < ymax` and cross yc at
+/// `x <= xc`.
 pub fn inside(polygon: &[Point], x: i32, y: i32) -> bool {
     let odd = edges(polygon).filter(|edge| edge.spans(y) && edge.crosses_left_of(x, y));
     odd.count() % 2 == 1
 }
 
-/// An edge, its upper end first. A level one spans no row: which end is first does not matter.
+/// An edge, its upper end first. A level edge spans no row, so the order of its ends does not matter.
 #[derive(Clone, Copy)]
 struct Edge {
     upper: Point,
@@ -46,7 +46,7 @@ impl Edge {
         i64::from(self.upper.y) <= yc && yc < i64::from(self.lower.y)
     }
 
-    /// x <= xc where the edge crosses yc, of one that spans the row.
+    /// x <= xc where the edge crosses yc. The edge spans the row.
     fn crosses_left_of(&self, x: i32, y: i32) -> bool {
         let (ux, uy) = (i64::from(self.upper.x), i64::from(self.upper.y));
         let (lx, ly) = (i64::from(self.lower.x), i64::from(self.lower.y));
@@ -65,7 +65,7 @@ pub struct Area {
 }
 
 impl Area {
-    /// The pixels of the screen that meet the polygon's bounding box, and one around them. No
+    /// The pixels of the screen that meet the polygon's bounding box, and the ring of pixels around them. No
     /// other pixel can be inside.
     pub fn around(polygon: &[Point]) -> Self {
         let range = |coordinates: &mut dyn Iterator<Item = i32>, limit: i32| {
@@ -81,13 +81,13 @@ impl Area {
         }
     }
 
-    /// How many pixels it has.
+    /// Number of pixels.
     pub fn pixels(&self) -> u64 {
         self.x.len() as u64 * self.y.len() as u64
     }
 }
 
-/// A row of the screen, a bit a pixel, the leftmost lowest.
+/// A row of the screen, one bit for each pixel; the lowest bit is the leftmost pixel.
 pub type Row = [u64; WIDTH as usize / 64];
 
 /// A set of pixels of the screen.
@@ -120,28 +120,28 @@ impl Pixels {
         self.row(y)[x as usize / 64] >> (x % 64) & 1 == 1
     }
 
-    /// Changes pixel (x, y) and all that follow it in its row.
+    /// Toggles pixel (x, y) and all that follow it in its row.
     pub fn toggle_from(&mut self, x: i32, y: i32) {
         let mut mask = !0 << (x % 64);
-        // Nothing where x is the row's end.
+        // Toggles nothing if x is the row's end.
         for word in &mut self.rows[y as usize][x as usize / 64..] {
             *word ^= mask;
             mask = !0;
         }
     }
 
-    /// Takes all pixels in the rows of `area` out of the set.
+    /// Removes all pixels in the rows of `area` from the set.
     pub fn clear(&mut self, area: &Area) {
         for y in area.y.clone() {
             *self.row_mut(y) = Row::default();
         }
     }
 
-    /// Fills the rows of `area`, which is at least [`Area::around`] the polygon, with the pixels
-    /// that are [`inside`] it.
+    /// Fills the rows of `area`, which is at least [`Area::around`] the polygon, with the pixels that are
+    /// [`inside`] it.
     ///
-    /// With x, an edge's answer goes from no to yes once and stays: so the first pixel with a
-    /// yes is looked up by halving, and all from there on change sides.
+    /// As x grows, an edge's answer changes from no to yes once. So a binary search finds the first pixel
+    /// with a yes, and all pixels from there on are toggled.
     pub fn cover(&mut self, polygon: &[Point], area: &Area) {
         self.clear(area);
         for edge in edges(polygon) {

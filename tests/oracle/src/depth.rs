@@ -1,9 +1,8 @@
-//! Which face is nearest at each pixel, from the definition, and solids that hide parts of
-//! themselves.
+//! Which face is nearest at each pixel, from the definition; and solids that hide parts of themselves.
 //!
-//! Of the faces that look at the viewer and cover a pixel, the nearest is seen; of faces that are
-//! equally near the first. A face is as near as its plane is, that of its three anchors, on the ray
-//! through the pixel's centre; and infinitely far if that plane is seen edge-on or from behind.
+//! Of the front faces that cover a pixel, the nearest is visible; of faces at equal distance, the first. The
+//! distance of a face is that of its plane, through its three anchors, along the ray through the pixel's
+//! centre. It is infinite if that plane is seen edge-on or from behind.
 
 use std::cmp::Ordering;
 use std::f64::consts::TAU;
@@ -18,8 +17,8 @@ use crate::coverage::{Area, Pixels};
 use crate::solid::{Count, Solid};
 use crate::texel::{cross, dot};
 
-/// 1 / z of a plane at a pixel, but for a factor that all planes share: a quotient, its divisor
-/// above zero.
+/// The inverse depth (1/z) of a plane at a pixel, except for a factor that all planes share: a quotient whose
+/// divisor is above zero.
 #[derive(Clone, Copy, Debug)]
 struct Nearness {
     n: i128,
@@ -27,7 +26,7 @@ struct Nearness {
 }
 
 impl Nearness {
-    /// Of a plane through three points within 2^24: n is below 2^63 and d below 2^78.
+    /// The inverse depth of a plane through three points within 2^24: n is below 2^63 and d below 2^78.
     fn new(anchors: &[Vec3; 3], x: i32, y: i32) -> Self {
         let [a, b, c] = anchors.map(|point| point.map(i128::from));
         let away = |p: [i128; 3]| [0, 1, 2].map(|k| p[k] - a[k]);
@@ -45,7 +44,7 @@ impl Nearness {
         Self { n, d }
     }
 
-    /// n d' against n' d, exactly: in two parts of 40 bits and the rest.
+    /// Compares n d' with n' d, exactly: in two parts, the low 40 bits and the rest.
     fn cmp(&self, other: &Self) -> Ordering {
         let product = |n: i128, d: i128| {
             let low = n * (d & ((1 << 40) - 1));
@@ -54,8 +53,8 @@ impl Nearness {
         product(self.n, other.d).cmp(&product(other.n, self.d))
     }
 
-    /// Whether one is larger than the other by less than 2^-40 of itself: the renderer cuts the
-    /// normals of very large faces.
+    /// Whether the two values differ by less than 2^-40 of the larger: the renderer rounds the normals of
+    /// very large faces.
     fn is_close_to(&self, other: &Self) -> bool {
         let (a, b) = (
             self.n as f64 / self.d as f64,
@@ -65,23 +64,23 @@ impl Nearness {
     }
 }
 
-/// What was compared.
+/// Counts of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compared {
     /// Pixels that a face covers.
     pub pixels: u64,
     /// Pixels that more than one face covers.
     pub contested: u64,
-    /// Of these, those at which another face is as near to 2^-40, and was taken.
+    /// Contested pixels where the renderer chose another face that is as near, to within 2^-40.
     pub ties: u64,
     /// Places in a column where one face ends and another begins.
     pub borders: u64,
 }
 
-/// Compares which face is seen at each pixel, and how often each is written as `mapper` maps it.
+/// Compares the visible face at each pixel, and how often each pixel is written when `mapper` maps it.
 ///
 /// # Errors
-/// What is wrong, in words.
+/// A description of the first difference.
 pub fn check(
     storage: &mut Storage,
     solid: &Solid,
@@ -137,7 +136,7 @@ pub fn check(
     })
 }
 
-/// The numbers of the faces that look at the viewer and cover each pixel, the nearest first.
+/// The numbers of the front faces that cover each pixel, the nearest first.
 pub fn nearest(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<u16>> {
     let numbers = |faces: Vec<(u16, Nearness)>| faces.into_iter().map(|face| face.0).collect();
     sorted(stage, pose).into_iter().map(numbers).collect()
@@ -166,14 +165,14 @@ fn sorted(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
         }
     });
     for faces in &mut at {
-        // Stable: of equals the first stays first.
+        // The sort is stable: of equal faces the first stays first.
         faces.sort_by(|(_, a), (_, b)| b.cmp(a));
     }
     at
 }
 
-/// A tube of triangles around a closed curve: of `around` rings with `sides` corners each. `ring` has
-/// a ring's middle and two directions across, all in units.
+/// A tube of triangles around a closed curve: `around` rings with `sides` corners each. `ring` returns a
+/// ring's centre and two directions across, all in units.
 fn tube(around: u16, sides: u16, ring: impl Fn(f64) -> [[f64; 3]; 3]) -> Solid {
     let mut vertices = Vec::new();
     for i in 0..around {
@@ -197,7 +196,7 @@ fn tube(around: u16, sides: u16, ring: impl Fn(f64) -> [[f64; 3]; 3]) -> Solid {
     Solid::new(&vertices, &faces).concave()
 }
 
-/// A ring of a radius, and a thickness, that lies in x and z, or stands.
+/// A torus of a radius and a thickness that lies in x and z, or stands.
 fn torus(radius: f64, thickness: f64, middle: [f64; 3], stands: bool) -> Solid {
     tube(20, 9, |angle| {
         let (sin, cos) = angle.sin_cos();
@@ -238,7 +237,7 @@ fn knot() -> Solid {
     })
 }
 
-/// Triangles anywhere, each for itself: most of them cut others.
+/// Independent triangles anywhere: most of them cut others.
 fn soup(random: &mut Rng, triangles: u16, extent: i32) -> Solid {
     let place = |random: &mut Rng| [(); 3].map(|()| random.i32(-extent..=extent));
     let vertices: Vec<Vec3> = (0..3 * triangles).map(|_| place(random)).collect();
@@ -249,8 +248,8 @@ fn soup(random: &mut Rng, triangles: u16, extent: i32) -> Solid {
     Solid::new(&vertices, &faces).concave()
 }
 
-/// Ten solids that hide parts of themselves, each in its own way, and how far away they are seen
-/// from.
+/// Ten solids that hide parts of themselves in different ways, and the range of distances from which they are
+/// seen.
 pub fn models(random: &mut Rng) -> [(&'static str, Solid, Range<i32>); 10] {
     const UNIT: i32 = 1 << 16;
     let afar = 2 * UNIT..6 * UNIT;
@@ -265,7 +264,7 @@ pub fn models(random: &mut Rng) -> [(&'static str, Solid, Range<i32>); 10] {
         [21_000, long, 26_000],
         [22_000, 27_000, long],
     ];
-    // Every face twice, in one place.
+    // Every face twice in the same place.
     let twice = Solid::cuboid([UNIT; 3]).and(&Solid::cuboid([UNIT; 3]));
     let shell = Solid::cuboid([UNIT, UNIT / 2, UNIT]).inside_out();
     [

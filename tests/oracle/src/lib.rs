@@ -1,13 +1,13 @@
-//! What the renderer must do, from the definitions, and the sweeps that compare the two.
+//! The renderer's required results, from the definitions, and the sweeps that compare the renderer with them.
 //!
-//! One renderer on both sides of a comparison cancels its own bugs. So [`coverage`], [`texel`] and
-//! [`sight`] share no code with the renderer, but for the plain types of points and faces, and are
-//! written to be read beside the definitions.
+//! If the renderer were on both sides of a comparison, its bugs would cancel. So [`coverage`], [`texel`] and
+//! [`sight`] share no code with the renderer, except for the plain types of points and faces, and are written
+//! to be read beside the definitions.
 //!
-//! [`mix`] makes the polygons that are most likely to go wrong, [`check`] compares the renderer's
-//! scans with the oracle on them, [`shrink`] makes a failure small. [`plane`] does the same for the
-//! exact mapper, [`solid`] for whole solids in any pose. `cargo sweep` runs all of them for as long
-//! as it is told to, the default tests for some seconds.
+//! [`mix`] makes the polygons that are most likely to go wrong, [`check`] compares the renderer's scans with
+//! the oracle on them, and [`shrink`] makes a failure small. [`plane`] does the same for the exact mapper,
+//! [`solid`] for whole solids in any pose. `cargo sweep` runs all of them for a chosen time, the default
+//! tests for some seconds.
 #![forbid(unsafe_code)]
 
 pub mod check;

@@ -1,7 +1,7 @@
-//! Random polygons that favour trouble, in mixes by name.
+//! Random polygons that are likely to fail, in named mixes.
 //!
-//! A case depends on the seed, its mix and its number alone: a sweep can be taken up anywhere,
-//! and a failure made again.
+//! A case depends only on the seed, its mix and its number: a sweep can resume anywhere, and a failure can be
+//! repeated.
 
 use fastrand::Rng;
 use texmap::{MAX_COORDINATE, Point};
@@ -9,32 +9,32 @@ use texmap::{MAX_COORDINATE, Point};
 use crate::check::Case;
 use crate::coverage::{HEIGHT, WIDTH};
 
-/// A kind of polygons. Each keeps what its name promises in every case.
+/// A kind of polygon. Every case has the property that the kind's name states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mix {
     /// All vertices on pixel centres.
     Centres,
-    /// All vertices on pixel edges, or on their corners.
+    /// All vertices on pixel edges, or on pixel corners.
     Borders,
-    /// All sides but the last horizontal, vertical or diagonal.
+    /// All sides but the last are horizontal, vertical or diagonal.
     Straight,
     /// Two long chains of sides 1/256 pixel apart.
     Slivers,
     /// Zero area: all vertices on a line.
     Flat,
-    /// Some vertex more than once.
+    /// At least one vertex occurs more than once.
     Repeated,
-    /// Some vertices in the middle of a side.
+    /// Some vertices lie in the middle of a side.
     Collinear,
     /// Non-convex, most of them self-crossing.
     Crossing,
-    /// Of positive area, as they are seen.
+    /// Positive area, as seen from the front.
     Clockwise,
-    /// Of negative area.
+    /// Negative area.
     Anticlockwise,
     /// Partly outside the screen.
     Outside,
-    /// Some vertex at least 10 000 pixels off the screen, many at the limit.
+    /// At least one vertex is 10 000 pixels or more off the screen, many are at the limit.
     Far,
     /// Less than a pixel wide and high.
     Tiny,
@@ -45,7 +45,7 @@ pub enum Mix {
 }
 
 impl Mix {
-    /// All of them.
+    /// All mixes.
     pub const ALL: [Self; 15] = [
         Self::Centres,
         Self::Borders,
@@ -64,7 +64,7 @@ impl Mix {
         Self::Meshes,
     ];
 
-    /// What it is called in the tables.
+    /// The mix's name in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Centres => "vertices on pixel centres",
@@ -114,12 +114,12 @@ impl Mix {
     }
 }
 
-/// The random numbers of a case. No two kinds of cases have the same `mix`.
+/// The random numbers of a case. No two kinds of cases use the same `mix`.
 pub(crate) fn stream(seed: u64, mix: u64, number: u64) -> Rng {
     Rng::with_seed(scramble(scramble(seed ^ scramble(mix)) ^ number))
 }
 
-/// The finaliser of splitmix64: neighbouring numbers give unrelated ones.
+/// The finaliser of splitmix64: neighbouring inputs give unrelated outputs.
 fn scramble(number: u64) -> u64 {
     let mut z = number.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -133,7 +133,7 @@ fn point(x: i32, y: i32) -> Point {
     Point { x, y }
 }
 
-/// Twice the area of the triangle; positive if it is clockwise as seen, y being down.
+/// Twice the area of the triangle; positive if it is clockwise on the screen, y down.
 fn area(a: Point, b: Point, c: Point) -> i64 {
     let d = |a: i32, b: i32| i64::from(b) - i64::from(a);
     d(a.x, b.x) * d(a.y, c.y) - d(a.x, c.x) * d(a.y, b.y)
@@ -145,7 +145,7 @@ fn polygon_area(polygon: &[Point]) -> i64 {
     sides.map(|(&a, &b)| area(point(0, 0), a, b)).sum()
 }
 
-/// Whether it never turns both ways.
+/// Whether the polygon never turns both ways.
 fn is_convex(polygon: &[Point]) -> bool {
     let n = polygon.len();
     let turns = (0..n).map(|i| area(polygon[i], polygon[(i + 1) % n], polygon[(i + 2) % n]));
@@ -161,7 +161,7 @@ fn is_on_screen(p: &Point) -> bool {
     (0..WIDTH * 256).contains(&p.x) && (0..HEIGHT * 256).contains(&p.y)
 }
 
-/// The direction's half turn, so that the sign of the area orders those within one.
+/// The half turn that contains the direction. The sign of the area orders the directions within a half turn.
 fn half(d: Point) -> bool {
     d.y < 0 || d.y == 0 && d.x < 0
 }
@@ -184,8 +184,8 @@ impl Draw {
         self.random.usize(3..=8)
     }
 
-    /// How far a polygon reaches from its middle: a fraction of a pixel to 16 pixels, and now
-    /// and then beyond the screen.
+    /// The distance from a polygon's centre to its vertices: a fraction of a pixel to 16 pixels, and
+    /// sometimes beyond the screen.
     fn reach(&mut self) -> i32 {
         let bits = if self.random.u8(..) < 6 {
             self.random.u32(13..=17)
@@ -195,7 +195,7 @@ impl Draw {
         (1 << bits) + self.random.i32(0..1 << bits)
     }
 
-    /// What positions are a multiple of, mostly.
+    /// A random grid spacing for positions, in 1/256 pixel.
     fn grid(&mut self) -> i32 {
         self.random.choice([1, 1, 16, 64, 128, 128, 256]).unwrap()
     }
@@ -204,7 +204,7 @@ impl Draw {
         self.random.i32(-reach..=reach)
     }
 
-    /// Somewhere on the screen or just beyond, at a multiple of `grid`, plus `off`.
+    /// A point on the screen or just beyond, at a multiple of `grid`, plus `off`.
     fn middle(&mut self, grid: i32, off: i32) -> Point {
         let mut place = |pixels: i32| {
             let place = self.random.i32(-8 * 256..(pixels + 8) * 256);
@@ -213,7 +213,7 @@ impl Draw {
         point(place(WIDTH), place(HEIGHT))
     }
 
-    /// A middle and vertices around it, all at multiples of `grid`, plus `off`.
+    /// Vertices around a centre, all at multiples of `grid`, plus `off`.
     fn around(&mut self, sides: usize, grid: i32, off: i32) -> Polygon {
         let reach = self.reach().max(2 * grid);
         let middle = self.middle(grid, off);
@@ -222,7 +222,7 @@ impl Draw {
         (0..sides).map(vertex).collect()
     }
 
-    /// With vertices on centres, on edges, or on neither.
+    /// Vertices on centres, on edges, or on neither.
     fn anything(&mut self) -> Polygon {
         let (sides, grid) = (self.sides(), self.grid());
         let off = self.random.choice([0, 128]).unwrap();
@@ -313,7 +313,7 @@ impl Draw {
             let from = polygon[self.random.usize(..sides)];
             polygon[self.random.usize(..sides)] = from;
         }
-        // It may have hit itself each time.
+        // Each copy above may have been of a vertex onto itself.
         polygon[1] = polygon[self.random.choice([0, 2]).unwrap()];
         polygon
     }
@@ -362,8 +362,8 @@ impl Draw {
         polygon
     }
 
-    /// Vectors in the order of their directions, clockwise as seen; at least one in each
-    /// quadrant if there are four or more.
+    /// Vectors sorted by direction, clockwise on the screen; if there are four or more, each quadrant has at
+    /// least one.
     fn ring(&mut self, count: usize, grid: i32) -> Polygon {
         let reach = self.reach().max(2 * grid);
         let mut ring = Vec::new();
@@ -404,7 +404,7 @@ impl Draw {
                 3 => -limit + self.random.i32(0..512),
                 4 => self.within(limit),
                 5 => self.within(limit) / 16,
-                // The centre of the outermost pixel that has one inside the limit.
+                // The centre of the outermost pixel whose centre is inside the limit.
                 6 => self.within(limit - 128) / 256 * 256 + 128,
                 _ => on_screen,
             }
@@ -416,7 +416,7 @@ impl Draw {
     fn tiny(&mut self) -> Polygon {
         let sides = self.sides();
         let middle = self.middle(256, 128);
-        // The pixel's centre, a corner, or anywhere.
+        // At the pixel's centre, at a corner, or anywhere.
         let off = self.random.choice([0, 128]).unwrap();
         let off = [off, off, self.within(128)][self.random.usize(..3)];
         let reach = (2 << self.random.u32(0..=6)) - 1;
@@ -427,8 +427,8 @@ impl Draw {
         (0..sides).map(vertex).collect()
     }
 
-    /// All triangles turn the same way, and once around in all: so none overlap, and together
-    /// they are the ring.
+    /// All triangles turn the same way, and once around in total: so none overlap, and together they are the
+    /// ring.
     fn fan(&mut self) -> Case {
         let grid = self.grid();
         let off = self.random.choice([0, 128]).unwrap();
@@ -453,8 +453,8 @@ impl Draw {
         }
     }
 
-    /// A lattice whose places are moved by at most a quarter of its spacing: that turns no
-    /// triangle over, so none overlap, and together they are the border.
+    /// A lattice whose points move by at most a quarter of its spacing. That turns no triangle over, so none
+    /// overlap, and together they fill the border.
     fn mesh(&mut self) -> Case {
         let spacing = self
             .random

@@ -1,6 +1,6 @@
-//! The exact mapper against its definition, on random planes of a texture.
+//! Checks the exact mapper against its definition, on random planes of a texture.
 //!
-//! As in [`crate::mix`], a case depends on the seed, its mix and its number alone.
+//! As in [`crate::mix`], a case depends only on the seed, its mix and its number.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -14,13 +14,13 @@ use texmap::{Texture, exact};
 use crate::mix::stream;
 use crate::texel::{forms, perspective};
 
-/// The camera's: cases are as it sees them.
+/// The camera's focal length: cases use it too.
 pub use scene::FOCAL_LENGTH;
 
-/// Columns drawn of each plane: making one takes as long as drawing some.
+/// Columns drawn of each plane: setting up a plane costs as much as drawing some columns.
 const COLUMNS: usize = 8;
 
-/// A kind of planes. Each keeps what its name promises in every case.
+/// A kind of plane. Every case has the property that the kind's name states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mix {
     /// From the near plane to 256 units, in one polygon.
@@ -31,16 +31,16 @@ pub enum Mix {
     Nearest,
     /// Facing the eye, with whole texels at pixels' centres: quotients that are whole numbers.
     Ties,
-    /// Through the eye, or no plane at all: three points on a line, or one point.
+    /// Through the eye, or degenerate: three points on a line, or a single point.
     ThroughEye,
-    /// From behind the eye to before it.
+    /// From behind the eye to in front of it.
     AcrossEye,
-    /// All of it behind the eye.
+    /// Entirely behind the eye.
     BehindEye,
 }
 
 impl Mix {
-    /// All of them.
+    /// All mixes.
     pub const ALL: [Self; 7] = [
         Self::Deep,
         Self::Near,
@@ -51,7 +51,7 @@ impl Mix {
         Self::BehindEye,
     ];
 
-    /// What it is called in the tables.
+    /// The mix's name in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Deep => "to 256 units",
@@ -69,7 +69,7 @@ impl Mix {
         let mut random = stream(seed, 32 + self as u64, number);
         let random = &mut random;
         let size = (side(random), side(random));
-        // Bits of the furthest z.
+        // Bits of the largest z.
         let deepest = match self {
             Self::Deep => 24,
             Self::Near => 16,
@@ -104,7 +104,7 @@ impl Mix {
     }
 }
 
-/// A side of a texture: powers of two and not, single texels, the largest, any.
+/// A side of a texture: powers of two and other numbers, single texels, the largest, any.
 fn side(random: &mut Rng) -> u16 {
     match random.u8(0..4) {
         0 => random.u16(1..=4),
@@ -113,7 +113,7 @@ fn side(random: &mut Rng) -> u16 {
     }
 }
 
-/// A point that the screen, or its neighbourhood, shows, its z of so many bits.
+/// A point on or near the screen, with its z in a random magnitude of `nearest` to `deepest` bits.
 pub fn anchor(random: &mut Rng, nearest: u32, deepest: u32, (w, h): (u16, u16)) -> Anchor {
     let bits = random.u32(nearest..deepest);
     let z = random.i32(1 << bits..2 << bits).min(MAX_POSITION);
@@ -129,12 +129,12 @@ pub fn anchor(random: &mut Rng, nearest: u32, deepest: u32, (w, h): (u16, u16)) 
     }
 }
 
-/// A rectangle's corner and the next two, all on pixels' centres and at whole texels. The scale is
-/// a power of two, so that cutting the plane rounds nothing and the ties stay ties.
+/// Three corners of a rectangle, all on pixels' centres and at whole texels. The scale is a power of two, so
+/// that quantising the plane rounds nothing and the ties remain ties.
 fn facing(random: &mut Rng, (w, h): (u16, u16)) -> [Anchor; 3] {
     let scale = 1 << random.u32(0..=12);
     let (x, y) = (random.i32(0..320), random.i32(0..240));
-    // A texel is as wide as some pixels, or as high.
+    // The next corners are 8 to 256 pixels away, to either side.
     let mut away = || random.choice([-1, 1]).unwrap() << random.u32(3..=8);
     let (across, down) = (away(), away());
     let mut anchor = |x: i32, y: i32| Anchor {
@@ -145,19 +145,19 @@ fn facing(random: &mut Rng, (w, h): (u16, u16)) -> [Anchor; 3] {
     [anchor(x, y), anchor(x + across, y), anchor(x, y + down)]
 }
 
-/// What a case consists of: a plane, a texture's size, and columns of the screen as x, y, length.
+/// A case: a plane, a texture's size, and columns of the screen as x, y, length.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Case {
     /// The plane.
     pub anchors: [Anchor; 3],
     /// Texels across and down.
     pub size: (u16, u16),
-    /// What is drawn.
+    /// The columns to draw.
     pub columns: Vec<(u16, u16, u16)>,
 }
 
 impl Case {
-    /// What is left of a case that fails: its first column that does.
+    /// Reduces a failing case to its first failing column.
     pub fn shrink(&self, checker: &mut Checker) -> Self {
         let alone = self.columns.iter().map(|&column| Self {
             columns: vec![column],
@@ -167,7 +167,8 @@ impl Case {
         failing.unwrap_or_else(|| self.clone())
     }
 
-    /// A test with the case, for `kernel/texmap/tests/exact.rs`; `from` says where it was found.
+    /// The source of a test with the case, for `kernel/texmap/tests/exact.rs`; `from` says where it was
+    /// found.
     pub fn source(&self, wrong: &Wrong, from: impl fmt::Display) -> String {
         let Self {
             anchors,
@@ -185,12 +186,12 @@ impl Case {
     }
 }
 
-/// What is wrong with a case.
+/// A reason why a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wrong {
     /// The mapper panicked.
     Panicked,
-    /// A form is further than [`ROUNDING`] from the real one.
+    /// A quantised form is further than [`ROUNDING`] from the exact form.
     Cut,
     /// The mapper read another texel than the floor of the quotient.
     Texel {
@@ -198,11 +199,11 @@ pub enum Wrong {
         x: u16,
         /// The pixel's row.
         y: u16,
-        /// Whether it is the texel's place across or down.
+        /// Whether the texel differs down the texture, not across.
         down: bool,
-        /// What the definition says.
+        /// The texel by the definition.
         expected: u16,
-        /// What the mapper read.
+        /// The texel that the mapper read.
         found: u16,
     },
 }
@@ -231,22 +232,23 @@ impl fmt::Display for Wrong {
 
 impl std::error::Error for Wrong {}
 
-/// What was compared.
+/// Counts of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Compared {
     /// Pixels, each with both of its coordinates.
     pub samples: u64,
-    /// Those of them where a coordinate is outside the texture.
+    /// Coordinates outside the texture.
     pub clamped: u64,
-    /// Those of them where a coordinate inside it is a whole number.
+    /// Coordinates inside the texture that are whole numbers.
     pub ties: u64,
 }
 
-/// Checks cases; it has the memory for that.
+/// Checks cases, and owns the memory for that.
 #[derive(Debug)]
 pub struct Checker {
     page: Box<PlanarBuffer>,
-    /// By width: texels that tell their column, and texels that tell their row, 256 rows of each.
+    /// By width: texels that contain their column's number, and texels that contain their row's, 256 rows of
+    /// each.
     axes: Vec<[Vec<u8>; 2]>,
 }
 
@@ -260,12 +262,12 @@ impl Default for Checker {
 }
 
 impl Checker {
-    /// Checks a case, and says what was compared.
+    /// Checks a case, and returns the counts of the comparison.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first error found.
     pub fn case(&mut self, case: &Case) -> Result<Compared, Wrong> {
-        // A panic is a failure like another, to be printed.
+        // A panic counts as a failure, so that the case is printed.
         catch_unwind(AssertUnwindSafe(|| self.columns(case))).unwrap_or(Err(Wrong::Panicked))
     }
 
@@ -341,8 +343,8 @@ fn at(form: &Form, x: u16, y: u16) -> i128 {
     origin + right * i128::from(x) + down * i128::from(y)
 }
 
-/// Whether some shift makes the real forms into the plane's, as far as [`ROUNDING`] lets it, at the
-/// upper end of the first column and at the lower end of the last.
+/// Whether a single shift turns the exact forms into the plane's forms, within [`ROUNDING`], at the upper end
+/// of the first column and at the lower end of the last.
 fn is_cut_by_one_shift(case: &Case, plane: &Plane) -> bool {
     let upper = case.columns.first().map(|&(x, y, _)| (x, y));
     let lower = case.columns.last().map(|&(x, y, len)| (x, y + len - 1));

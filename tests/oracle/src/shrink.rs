@@ -1,4 +1,4 @@
-//! From a polygon that fails to a small one, as a test to paste.
+//! Shrinks a failing polygon, and writes it as a test to paste.
 
 use std::fmt::{Display, Write};
 
@@ -6,8 +6,8 @@ use texmap::{MAX_COORDINATE, Point};
 
 use crate::check::{Case, Checker, Wrong};
 
-/// What is left of a case that fails: mostly a single polygon, made as simple as it can be and
-/// still fail. Where only the whole of it fails, it is left as it is.
+/// Shrinks a failing case, usually to a single polygon that is as simple as it can be and still fail. If only
+/// the whole case fails, the case stays as it is.
 pub fn shrink(checker: &mut Checker, case: &Case) -> Case {
     let Some(failing) = case.polygons.iter().find(|p| checker.polygon(p).is_err()) else {
         return case.clone();
@@ -25,7 +25,7 @@ pub fn shrink(checker: &mut Checker, case: &Case) -> Case {
     }
 }
 
-/// Polygons that are one step simpler, and legal; every chain of them ends.
+/// Legal polygons that are one step simpler; every chain of steps ends.
 fn simpler(polygon: &[Point]) -> Vec<Vec<Point>> {
     let mut tries = Vec::new();
     for i in 0..polygon.len() {
@@ -63,7 +63,7 @@ fn is_legal(p: &Point) -> bool {
     p.x.abs().max(p.y.abs()) <= MAX_COORDINATE
 }
 
-/// Ways to make a coordinate simpler.
+/// Ways to simplify a coordinate.
 const CHANGES: [fn(i32) -> i32; 11] = [
     |_| 0,
     |c| c / 2,
@@ -78,7 +78,7 @@ const CHANGES: [fn(i32) -> i32; 11] = [
     |c| c - c.signum() * 4096 * 256,
 ];
 
-/// Fewer vertices first, then rounder coordinates, then smaller ones.
+/// Fewer vertices first, then rounder coordinates, then smaller coordinates.
 fn cost(polygon: &[Point]) -> (usize, u32, i64) {
     let coordinates = || polygon.iter().flat_map(|p| [p.x, p.y]);
     let bits = coordinates().map(|c| 8 - c.trailing_zeros().min(8)).sum();
@@ -86,7 +86,7 @@ fn cost(polygon: &[Point]) -> (usize, u32, i64) {
     (polygon.len(), bits, size)
 }
 
-/// A test with the case, for `tests/oracle/tests/coverage.rs`; `from` says where it was found.
+/// The source of a test with the case, for `tests/oracle/tests/coverage.rs`; `from` says where it was found.
 pub fn source(case: &Case, wrong: &Wrong, from: impl Display) -> String {
     let points = |polygon: &[Point]| {
         let point = |p: &Point| format!("({}, {})", p.x, p.y);

@@ -1,8 +1,7 @@
-//! Faces as they are in space: which lines of sight meet them, before anything is snapped or
-//! clipped.
+//! Faces in space: which lines of sight meet them, before anything is snapped or clipped.
 //!
-//! A ray passes each edge of a convex face on the same side if it meets the face: that is the sign
-//! of a determinant. No point is projected. Along the screen each determinant is a linear form.
+//! A ray that meets a convex face passes all its edges on the same side, which is the sign of a determinant.
+//! No point is projected. Along the screen each determinant is a linear form.
 
 use std::ops::Range;
 
@@ -11,12 +10,12 @@ use scene::{FOCAL_LENGTH, NEAR, Vec3};
 
 use crate::texel::{cross, dot};
 
-/// A linear form of the screen, above zero on its inner side.
+/// A linear form on the screen, above zero on its inner side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Form {
-    /// In the direction of twice the ray, so that it is whole.
+    /// Coefficients for the direction of twice the ray, so that they are integers.
     across: [i128; 3],
-    /// What does not depend on the ray.
+    /// The part that does not depend on the ray.
     constant: i128,
 }
 
@@ -30,8 +29,8 @@ impl Form {
         dot(self.across, ray.map(i128::from)) + self.constant
     }
 
-    /// The part of a row's `columns` where the form is at least `least`. Along the row it changes
-    /// from no to yes once, or from yes to no: where is found by halving.
+    /// The part of a row's `columns` where the form is at least `least`. Along the row the answer changes
+    /// once, from no to yes or from yes to no; a binary search finds the place.
     fn part(&self, y: i32, columns: Range<i32>, least: i128) -> Range<i32> {
         let grows = self.across[0] > 0;
         let Range { mut start, mut end } = columns;
@@ -49,25 +48,26 @@ impl Form {
         }
     }
 
-    /// How far a pixel's centre is from where the form is zero, in pixels.
+    /// The distance in pixels from a pixel's centre to the line where the form is zero.
     fn distance(&self, x: i32, y: i32) -> f64 {
         let [right, down, _] = self.across.map(|k| 2.0 * k as f64);
         (self.at(x, y) as f64).abs() / right.hypot(down)
     }
 }
 
-/// A flat convex face before the eye, beside it, or cut by the near plane.
+/// A flat convex face in front of the eye or beside it, or one that the near plane cuts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Face {
     edges: Vec<Form>,
     near: Form,
-    /// What the volume of the face with the eye is: above zero if the face looks at the eye.
+    /// The volume of the pyramid from the eye to the face, times a constant: above zero if the face looks at
+    /// the eye.
     volume: i128,
 }
 
 impl Face {
-    /// The face with these corners in the viewer's space, each coordinate within 2^24: a
-    /// determinant is below 2^61, a volume below 2^75.
+    /// The face with these corners in view space, each coordinate within 2^24: a determinant is below 2^61, a
+    /// volume below 2^75.
     pub fn new(corners: &[Vec3]) -> Self {
         let wide = |i: usize| corners[i % corners.len()].map(i128::from);
         let normals: Vec<_> = (0..corners.len())
@@ -75,7 +75,7 @@ impl Face {
             .collect();
         let normal = [0, 1, 2].map(|k| normals.iter().map(|n| n[k]).sum());
         let volume = dot(wide(0), normal);
-        // Seen from behind, the face is walked the other way round.
+        // A face seen from behind is walked the other way round.
         let sign = if volume < 0 { -1 } else { 1 };
         let edge = |normal: &[i128; 3]| Form {
             across: normal.map(|k| sign * k),
@@ -83,7 +83,7 @@ impl Face {
         };
         Self {
             edges: normals.iter().map(edge).collect(),
-            // The plane is met at z = volume / (normal . ray) times the ray's z.
+            // The ray meets the plane at z = volume / (normal . ray) times the ray's z.
             near: Form {
                 across: normal.map(|k| -sign * i128::from(NEAR) * k),
                 constant: sign * volume * i128::from(2 * FOCAL_LENGTH),
@@ -92,13 +92,13 @@ impl Face {
         }
     }
 
-    /// Whether it looks at the eye.
+    /// Whether the face looks at the eye.
     pub fn looks_at_eye(&self) -> bool {
         self.volume > 0
     }
 
-    /// Whether it is so nearly edge-on that moving its corners by as much as `by` may turn it over: by
-    /// how much the volume can change then, to first order.
+    /// Whether moving the corners by `by` may turn the face over, because it is nearly edge-on: compares the
+    /// volume with its largest change, to first order.
     pub fn is_edge_on(&self, by: f64) -> bool {
         let length = |edge: &Form| {
             let [x, y, z] = edge.across.map(|k| k as f64);
@@ -107,24 +107,24 @@ impl Face {
         (self.volume as f64).abs() <= by * self.edges.iter().map(length).sum::<f64>()
     }
 
-    /// The pixels of row `y`, of those in `columns`, whose centres' lines of sight pass between the
-    /// edges; and those of them that meet the face beyond the near plane or on it.
+    /// The pixels of row `y` in `columns` whose centres' lines of sight pass between the edges; and those of
+    /// them that meet the face on the near plane or beyond it.
     pub fn row(&self, y: i32, columns: Range<i32>) -> (Range<i32>, Range<i32>) {
         let edges = self.edges.iter();
         let between = edges.fold(columns, |columns, edge| edge.part(y, columns, 1));
         (between.clone(), self.near.part(y, between, 0))
     }
 
-    /// How far a pixel's centre is from the line of the nearest edge, that of the near plane's cut
-    /// among them, in pixels.
+    /// The distance in pixels from a pixel's centre to the line of the nearest edge. The near plane's cut
+    /// counts as an edge.
     pub fn distance(&self, x: i32, y: i32) -> f64 {
         let forms = self.edges.iter().chain([&self.near]);
         let distances = forms.map(|form| form.distance(x, y));
         distances.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether no line of sight through the screen meets it, by one edge alone: a linear form that
-    /// is nowhere above zero at the corners is so nowhere between.
+    /// Whether a single edge shows that no line of sight through the screen meets the face. If a linear form
+    /// is nowhere above zero at the corners, it is nowhere above zero between them.
     pub fn is_beside_screen(&self) -> bool {
         let (right, bottom) = (WIDTH as i32 - 1, HEIGHT as i32 - 1);
         let corners = [(0, 0), (right, 0), (0, bottom), (right, bottom)];

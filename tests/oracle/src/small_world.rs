@@ -1,12 +1,12 @@
-//! Every triangle of a small world: the ordered triples of places on a lattice of 16 x 16.
+//! Every triangle of a small world: the ordered triples of points on a lattice of 16 x 16.
 
 use texmap::Point;
 
-/// How many triangles there are.
+/// Number of triangles.
 pub const TRIANGLES: u32 = 1 << 24;
 
-/// Lattices that meet many pixel centres (128 beyond a multiple of 256) and pixel edges: half a
-/// pixel from place to place, 8 x 8 pixels in all, and a quarter, 4 x 4.
+/// Lattices that meet many pixel centres (128 beyond a multiple of 256) and pixel edges. The points are half
+/// a pixel apart (8 x 8 pixels in all) or a quarter (4 x 4).
 pub const STEPS: [i32; 2] = [128, 64];
 
 /// Triangle `number` of the world with this step; it lies within the screen.

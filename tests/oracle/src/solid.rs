@@ -1,6 +1,6 @@
 //! Whole solids in any pose: nothing dropped, no gap, and each face where lines of sight meet it.
 //!
-//! As in [`crate::mix`], a case depends on the seed, its mix and its number alone.
+//! As in [`crate::mix`], a case depends only on the seed, its mix and its number.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -23,7 +23,7 @@ const UNIT: i32 = 1 << 16;
 /// Texels of a side of the solids' texture.
 const TEXELS: u16 = 16;
 
-/// A solid of one texture, owned.
+/// A solid with one texture that owns its data.
 #[derive(Clone, Debug)]
 pub struct Solid {
     /// Points, 16.16.
@@ -34,7 +34,7 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// The faces by their vertices, clockwise from outside.
+    /// A solid from its faces, whose vertices are listed clockwise as seen from outside.
     pub fn new(vertices: &[Vec3], faces: &[&[u16]]) -> Self {
         let mut solid = Self {
             vertices: vertices.to_vec(),
@@ -59,7 +59,7 @@ impl Solid {
         solid
     }
 
-    /// A box of these half sides: bit k of a vertex is its sign along axis k.
+    /// A box with these half sides: bit k of a vertex is its sign along axis k.
     pub fn cuboid(half: Vec3) -> Self {
         let vertices: Vec<Vec3> = (0..8)
             .map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 1 { half[k] } else { -half[k] }))
@@ -77,7 +77,7 @@ impl Solid {
         )
     }
 
-    /// The unit octahedron, every edge of which may lie exactly on pixels' centres.
+    /// The unit octahedron. Each of its edges can lie exactly on pixels' centres.
     pub fn octahedron() -> Self {
         let axes = [0, 1, 2].map(|k| [0, 1, 2].map(|i| i32::from(i == k) << 16));
         let vertices: Vec<Vec3> = axes.iter().flat_map(|&a| [a, a.map(|k| -k)]).collect();
@@ -91,7 +91,7 @@ impl Solid {
         Self::new(&vertices, &faces)
     }
 
-    /// The unit ball of the demo.
+    /// The demo's unit ball.
     pub fn ball() -> Self {
         let mesh = scene::ball(&[]).mesh;
         let mut solid = Self {
@@ -100,7 +100,7 @@ impl Solid {
             faces: mesh.faces.to_vec(),
             convex: true,
         };
-        // Another texture: its places only have to be inside.
+        // The texture is a different one: coordinates only have to be inside it.
         for corner in &mut solid.corners {
             corner.u %= i32::from(TEXELS) << 16;
             corner.v %= i32::from(TEXELS) << 16;
@@ -108,7 +108,7 @@ impl Solid {
         solid
     }
 
-    /// Every face turned over: what was seen from outside is seen from inside.
+    /// Turns every face over: the inside becomes the outside.
     #[must_use]
     pub fn inside_out(mut self) -> Self {
         for face in &self.faces {
@@ -117,7 +117,7 @@ impl Solid {
         self
     }
 
-    /// Moved, so that `eye` is at the origin: at distance 0 it is the eye's place.
+    /// Moves the solid so that `eye` is at the origin: at distance 0 the eye is there.
     #[must_use]
     pub fn seen_from(mut self, eye: Vec3) -> Self {
         for vertex in &mut self.vertices {
@@ -126,8 +126,8 @@ impl Solid {
         self
     }
 
-    /// Each vertex `lengths` as far from the middle (16.16), taken in turn. Any lengths leave a
-    /// surface that each ray from the middle meets once.
+    /// Scales the distance of each vertex from the centre by the next of `lengths` (16.16), in turn. Any
+    /// lengths leave a surface that each ray from the centre meets once.
     #[must_use]
     pub fn stretched(mut self, lengths: &[i32]) -> Self {
         for (vertex, &length) in self.vertices.iter_mut().zip(lengths.iter().cycle()) {
@@ -142,7 +142,7 @@ impl Solid {
         coordinates.map(|k| k.abs()).max().unwrap_or(0)
     }
 
-    /// The same, taken for one whose faces may hide each other.
+    /// Marks the solid as not convex: its faces may hide each other.
     #[must_use]
     pub fn concave(mut self) -> Self {
         self.convex = false;
@@ -166,7 +166,7 @@ impl Solid {
         self.concave()
     }
 
-    /// Calls `act` with a stage on which the solid is.
+    /// Calls `act` with a stage that has the solid.
     pub fn on_stage<T>(&self, storage: &mut Storage, act: impl FnOnce(&mut Stage<'_>) -> T) -> T {
         static LIGHT: LightTable = [[1; 256]; LIGHT_LEVELS];
         static PALETTE: Palette = [[0; 3]; 256];
@@ -190,7 +190,7 @@ impl Solid {
         act(&mut Stage::new(storage, scene))
     }
 
-    /// The corners of each face in the viewer's space.
+    /// The corners of each face in view space.
     fn views(&self, pose: &Pose) -> impl Iterator<Item = Vec<Vec3>> {
         let orientation = pose.orientation();
         let view = move |corner: &Corner| {
@@ -204,7 +204,7 @@ impl Solid {
     }
 }
 
-/// How often each pixel was written, with a page to write to.
+/// Counts how often each pixel was written, and owns a page to write to.
 #[derive(Debug)]
 pub struct Count {
     times: Vec<u8>,
@@ -221,30 +221,30 @@ impl Default for Count {
 }
 
 impl Count {
-    /// Pixels never written, and pixels written more than once.
+    /// The number of pixels never written, and of pixels written more than once.
     pub fn gaps_and_doubles(&self) -> (usize, usize) {
         let count = |wrong: fn(u8) -> bool| self.times.iter().filter(|&&n| wrong(n)).count();
         (count(|n| n == 0), count(|n| n > 1))
     }
 
-    /// How often pixel `i` was written, counted from the upper left along the rows.
+    /// How often pixel `i` was written. Pixels are numbered along the rows from the upper left.
     pub fn times(&self, i: usize) -> u8 {
         self.times[i]
     }
 
-    /// The first pixel whose number of times is wrong, with the number.
+    /// The first pixel whose count is wrong, with the count.
     fn first(&self, mut wrong: impl FnMut(usize, u8) -> bool) -> Option<(i32, i32, u8)> {
         let mut all = self.times.iter().enumerate();
         let (i, &times) = all.find(|&(i, &times)| wrong(i, times))?;
         Some(((i % WIDTH) as i32, (i / WIDTH) as i32, times))
     }
 
-    /// Draws a solid, nothing having been written before.
+    /// Clears the counts and draws a solid.
     pub fn draw(&mut self, storage: &mut Storage, solid: &Solid, pose: &Pose) -> Stats {
         solid.on_stage(storage, |stage| self.redraw(stage, pose))
     }
 
-    /// Draws what is on a stage, nothing having been written before.
+    /// Clears the counts and draws a stage's solid.
     pub fn redraw(&mut self, stage: &mut Stage<'_>, pose: &Pose) -> Stats {
         self.times.fill(0);
         stage.draw(pose, self)
@@ -262,7 +262,7 @@ impl Destination for Count {
         draw: impl FnOnce(Lane<'_, STEP>),
     ) {
         for i in 0..usize::from(len) {
-            // A byte further is every fourth pixel of a row.
+            // The next byte of a plane is the fourth pixel further in the row.
             let along = i * STEP / STRIDE * WIDTH + i * STEP % STRIDE * 4;
             let times = &mut self.times[usize::from(y) * WIDTH + usize::from(x) + along];
             *times = times.saturating_add(1);
@@ -271,41 +271,41 @@ impl Destination for Count {
     }
 }
 
-/// A solid's form. Lengths are as [`Solid::stretched`] has them.
+/// A solid's shape. Lengths are those of [`Solid::stretched`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Shape {
     /// [`Solid::ball`].
     Ball(Vec<i32>),
     /// [`Solid::octahedron`].
     Octahedron(Vec<i32>),
-    /// [`Solid::cuboid`] of half sides, seen from a place inside of it.
+    /// [`Solid::cuboid`] of half sides, seen from a point inside.
     Cuboid(Vec3, Vec3),
 }
 
-/// Where the eye is, and so what must hold.
+/// The eye's place, which decides the properties that must hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Eye {
-    /// What the solid's front covers, its back does, each pixel as often: so the front leaves no
-    /// gap. Each pixel is written once, or lies in a fold: a facet at the silhouette may be turned
-    /// over by snapping, or by the rounding of its corners before. It then lies on its neighbour,
-    /// 1/256 pixel wide, and where a pixel's centre lies in there both cover it. No rule for single
-    /// polygons can tell: culling by the real area would leave a gap.
+    /// The solid's front and back cover the same pixels equally often, so the front leaves no gap. Each pixel
+    /// is written once, or lies in a fold. A fold arises where snapping, or the earlier rounding of corners,
+    /// turns over a facet at the silhouette: the facet then overlaps its neighbour by 1/256 pixel, and both
+    /// cover a pixel whose centre lies in the overlap. No rule for single polygons can detect that, and
+    /// culling by the exact area would leave a gap.
     Outside,
     /// Each pixel is written once.
     Inside,
-    /// Each face covers the pixels whose lines of sight meet it, but for those within 1/128 pixel
-    /// of an edge. Snapping moves a vertex by 1/512 pixel each way.
+    /// Each face covers the pixels whose lines of sight meet it, except within 1/128 pixel of an edge.
+    /// Snapping moves a vertex by up to 1/512 pixel in x and y.
     Anywhere,
 }
 
-/// What a case consists of.
+/// A case: a solid, its pose and the eye's place.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Case {
     /// The solid.
     pub shape: Shape,
-    /// Where it is.
+    /// The solid's pose.
     pub pose: Pose,
-    /// Where the eye is.
+    /// The eye's place.
     pub eye: Eye,
 }
 
@@ -318,7 +318,7 @@ impl Case {
         }
     }
 
-    /// A test with the case, for `kernel/scene/tests/clips.rs`; `from` says where it was found.
+    /// The source of a test with the case, for `kernel/scene/tests/clips.rs`; `from` says where it was found.
     pub fn source(&self, wrong: &Wrong, from: impl fmt::Display) -> String {
         let Self { shape, pose, eye } = self;
         let shape = match shape {
@@ -336,10 +336,10 @@ impl Case {
     }
 }
 
-/// A kind of solids.
+/// A kind of solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mix {
-    /// The ball from outside, from a radius of a twentieth of a pixel on.
+    /// The ball from outside, with a radius from a twentieth of a pixel upward.
     Ball,
     /// A cube from outside.
     Cube,
@@ -347,17 +347,17 @@ pub enum Mix {
     Octahedron,
     /// The ball from inside.
     InBall,
-    /// Boxes from inside, half of them with the eye as near to a face as it may come.
+    /// Boxes from inside, about half of them with the eye as near to a face as it may come.
     InBox,
     /// Balls and octahedra with vertices at any distance, from inside.
     InCrag,
-    /// Octahedra with vertices at any distance, wherever the eye is: cut by the near plane and by
-    /// the guard band.
+    /// Octahedra with vertices at any distance, with the eye anywhere: cut by the near plane and by the guard
+    /// band.
     Anywhere,
 }
 
 impl Mix {
-    /// All of them.
+    /// All mixes.
     pub const ALL: [Self; 7] = [
         Self::Ball,
         Self::Cube,
@@ -368,7 +368,7 @@ impl Mix {
         Self::Anywhere,
     ];
 
-    /// What it is called in the tables.
+    /// The mix's name in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ball => "ball from outside",
@@ -387,11 +387,11 @@ impl Mix {
         let random = &mut random;
         match self {
             Self::Ball => from_outside(random, UNIT, |scale| Shape::Ball(vec![scale])),
-            // Its corners are at the square root of three.
+            // The cube's corners are at the square root of three.
             Self::Cube => from_outside(random, 113_513, |scale| Shape::Cuboid([scale; 3], [0; 3])),
             Self::Octahedron => from_outside(random, UNIT, |scale| Shape::Octahedron(vec![scale])),
             Self::InBall => {
-                // Its faces are nowhere nearer than 0.98 to its middle.
+                // The ball's faces are nowhere nearer than 0.98 to its centre.
                 let distance = random.i32(0..UNIT / 100 * 97);
                 Case {
                     shape: Shape::Ball(vec![UNIT]),
@@ -430,7 +430,7 @@ impl Mix {
                 }
             }
             Self::Anywhere => {
-                // From half the near plane's distance on, all sizes alike.
+                // From half the near plane's distance; every magnitude is equally likely.
                 let mut any = || {
                     let bits = random.u32(6..22);
                     random.i32(1 << bits..=2 << bits)
@@ -451,7 +451,7 @@ impl Mix {
 fn from_outside(random: &mut Rng, reach: i32, shape: impl Fn(i32) -> Shape) -> Case {
     let shift = random.choice([0, 3, 6]).unwrap_or(0);
     let distance = if random.u8(0..8) == 0 {
-        // With room for what turning rounds.
+        // With room for the rounding of the turn.
         (reach >> shift) + 260 + random.i32(0..UNIT / 4)
     } else {
         let bits = random.u32(17..23);
@@ -464,8 +464,8 @@ fn from_outside(random: &mut Rng, reach: i32, shape: impl Fn(i32) -> Shape) -> C
     }
 }
 
-/// Any angles at a distance; a fifth of them lie along the axes, where faces are edge-on or fill the
-/// screen.
+/// Random angles at a distance. A fifth of the angles are multiples of an eighth of a turn, where faces are
+/// edge-on or fill the screen.
 pub fn pose(random: &mut Rng, distance: i32) -> Pose {
     let mut angle = || {
         if random.u8(0..5) == 0 {
@@ -482,25 +482,25 @@ pub fn pose(random: &mut Rng, distance: i32) -> Pose {
     }
 }
 
-/// From 1/64 unit to 64 units, all sizes alike.
+/// From 1/64 unit to 64 units; every magnitude is equally likely.
 pub fn length(random: &mut Rng) -> i32 {
     let bits = random.u32(10..22);
     random.i32(1 << bits..=2 << bits)
 }
 
-/// What is wrong with a case.
+/// A reason why a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Wrong {
     /// Drawing it panicked.
     Panicked,
-    /// So many faces were dropped.
+    /// This many faces were dropped.
     Dropped(u32),
-    /// The pixel was not written, or so many times, and in no fold.
+    /// The pixel was written this many times instead of once, and lies in no fold.
     Times(i32, i32, u8),
-    /// The pixel was not written as often by the solid's front as by its back.
+    /// The solid's front and back did not write the pixel equally often.
     Sides(i32, i32),
-    /// The face with these corners is drawn on the pixel, or not, as its line of sight does not
-    /// tell; so far from the nearest edge in 1/1000 pixel.
+    /// The face with these corners covers the pixel although its line of sight misses the face, or the
+    /// reverse. The last number is the distance to the nearest edge in 1/1000 pixel.
     Sight(i32, i32, Vec<Vec3>, u32),
 }
 
@@ -525,22 +525,22 @@ impl fmt::Display for Wrong {
 
 impl std::error::Error for Wrong {}
 
-/// What was compared.
+/// Counts of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Compared {
-    /// Faces drawn, or asked for.
+    /// Faces drawn, or compared.
     pub faces: u64,
     /// Pixels compared.
     pub pixels: u64,
-    /// Those of them that a fold has ([`Eye::Outside`]).
+    /// Compared pixels that lie in a fold ([`Eye::Outside`]).
     pub folds: u64,
-    /// Faces on the screen, beyond which the near plane or the guard band cut ([`Eye::Anywhere`]).
+    /// Faces on the screen that the near plane or the guard band cut ([`Eye::Anywhere`]).
     pub cut: [u64; 2],
-    /// Pixels from which the near plane alone took a face.
+    /// Pixels from which the near plane alone removed a face.
     pub cut_away: u64,
-    /// Pixels that snapping took to the other side of an edge.
+    /// Pixels that snapping moved to the other side of an edge.
     pub changed: u64,
-    /// The furthest of these from its edge, in pixels.
+    /// The largest distance of a changed pixel from its edge, in pixels.
     pub furthest: f64,
 }
 
@@ -556,10 +556,10 @@ impl std::ops::AddAssign for Compared {
     }
 }
 
-/// Furthest from a true edge that a pixel may lie on the other side.
+/// Largest distance from a true edge at which a pixel may lie on the other side.
 const SNAPPED: f64 = 1.0 / 128.0;
 
-/// Checks cases; it has the memory for that.
+/// Checks cases, and owns the memory for that.
 #[derive(Debug)]
 pub struct Checker {
     storage: InPlace<Storage>,
@@ -580,13 +580,13 @@ impl Default for Checker {
 }
 
 impl Checker {
-    /// Checks a case, and says what was compared.
+    /// Checks a case, and returns the counts of the comparison.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first error found.
     pub fn case(&mut self, case: &Case) -> Result<Compared, Wrong> {
         let (solid, pose) = (case.solid(), &case.pose);
-        // A panic is a failure like another, to be printed.
+        // A panic counts as a failure, so that the case is printed.
         let check = AssertUnwindSafe(|| match case.eye {
             Eye::Outside => self.seen_from_outside(&solid, pose),
             Eye::Inside => self.seen_from_inside(&solid.inside_out(), pose),
@@ -642,10 +642,10 @@ impl Checker {
         })
     }
 
-    /// Compares the faces of a solid that look at the eye with lines of sight, each for itself.
+    /// Compares each front face of a solid separately with lines of sight.
     ///
     /// # Errors
-    /// The first thing that is wrong.
+    /// The first error found.
     pub fn by_sight(&mut self, solid: &Solid, pose: &Pose) -> Result<Compared, Wrong> {
         let mut drawn = Vec::new();
         let mut dropped = 0;
@@ -697,7 +697,7 @@ impl Checker {
             let (between, met) = face.row(y, area.x.clone());
             seen |= !met.is_empty();
             compared.cut_away += (between.len() - met.len()) as u64;
-            // What is left are the pixels that differ.
+            // The pixels that differ remain.
             self.covered.toggle_from(met.start, y);
             self.covered.toggle_from(met.end, y);
             if *self.covered.row(y) == Row::default() {
@@ -723,7 +723,7 @@ impl Checker {
     }
 }
 
-/// Those of a face's corners that [`texmap::Face`] has: by them it is known again.
+/// The corners of a face that [`texmap::Face`] has as anchors; they identify the face.
 fn anchors(corners: &[Vec3]) -> [Vec3; 3] {
     [0, 1, 2].map(|i| corners[i * corners.len() / 3])
 }
@@ -735,11 +735,11 @@ fn none_dropped(stats: Stats) -> Result<(), Wrong> {
     }
 }
 
-/// Furthest that rounding has moved a corner from where a convex solid has it, in 2^-16 unit: along
-/// each axis a half by the mesh, one by [`Solid::stretched`] and a half by turning.
+/// Largest distance by which rounding moves a corner of a convex solid, in 2^-16 unit. Along each axis the
+/// mesh adds a half, [`Solid::stretched`] one and turning a half.
 const ROUNDED: f64 = 2.0 * 1.733;
 
-/// Whether a face covers the pixel that is drawn, and that rounding may have turned over.
+/// Whether the drawn pixel is covered by a face that rounding may have turned over.
 fn is_in_fold(storage: &mut Storage, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
     let mut covering = Vec::new();
     solid.on_stage(storage, |stage| {

@@ -1,5 +1,5 @@
-//! Texture coordinates from their definitions: affine, along the edges to the column's centre, then
-//! down the column; with perspective, the floor of a quotient.
+//! Texture coordinates from their definitions. Affine: along the edges to the column's centre, then down the
+//! column. Perspective: the floor of a quotient.
 
 use texmap::Vertex;
 use texmap::plane::Anchor;
@@ -7,16 +7,15 @@ use texmap::plane::Anchor;
 /// A coordinate as a quotient, in 16.16 texels; the divisor is above zero.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Coordinate {
-    /// What is divided.
+    /// The dividend.
     pub n: i128,
-    /// What divides it.
+    /// The divisor.
     pub d: i128,
 }
 
 impl Coordinate {
-    /// The texels that the coordinate may be read as when it is off by at most 2^-`bits` texel
-    /// (`bits` is at most 16), in a texture of `size` texels: one, or two neighbours. The last owns
-    /// its far border.
+    /// The texels that may be read if the coordinate is off by at most 2^-`bits` texel (`bits` is at most
+    /// 16), in a texture of `size` texels: one texel, or two neighbours. The last texel owns its far border.
     pub fn texels(self, bits: u32, size: u16) -> std::ops::RangeInclusive<u16> {
         let texel = |by: i128| {
             let n = self.n + by * (self.d << (16 - bits));
@@ -27,18 +26,18 @@ impl Coordinate {
     }
 }
 
-/// Where an edge crosses a column's centre: its height and coordinates there, over `dx`.
+/// The crossing of an edge with a column's centre: its height and coordinates, times `dx`.
 struct Crossing {
     dx: i128,
     y: i128,
     uv: [i128; 2],
 }
 
-/// The coordinates at the centre of a pixel inside of a convex polygon; none if its column meets
-/// no edge above or none below it.
+/// Returns the coordinates at the centre of a pixel inside a convex polygon, or `None` if its column meets no
+/// edge above the centre or no edge below it.
 ///
-/// Vertices are within the renderer's limit of 2^23: a side's dx is below 2^24, a crossing over it
-/// below 2^49, their difference over both dx below 2^74, and the quotients' parts below 2^124.
+/// Vertices are within the renderer's limit of 2^23: a side's dx is below 2^24, a crossing times dx below
+/// 2^49, the difference of two crossings times both dx below 2^74, and the quotients' parts below 2^124.
 pub fn affine(polygon: &[Vertex], x: i32, y: i32) -> Option<[Coordinate; 2]> {
     let [xc, yc] = [x, y].map(|k| i128::from(k) * 256 + 128);
     let mut above: Option<Crossing> = None;
@@ -58,7 +57,7 @@ pub fn affine(polygon: &[Vertex], x: i32, y: i32) -> Option<[Coordinate; 2]> {
             uv: [at(a.u, b.u), at(a.v, b.v)],
         };
         if crossing.y == yc * dx {
-            // On the edge itself nothing is left to interpolate.
+            // The centre is on the edge, so there is nothing left to interpolate.
             return Some(crossing.uv.map(|n| Coordinate { n, d: dx }));
         }
         let nearer = |held: &Option<Crossing>, lower: bool| match held {
@@ -77,7 +76,7 @@ pub fn affine(polygon: &[Vertex], x: i32, y: i32) -> Option<[Coordinate; 2]> {
         }
     }
     let (top, bottom) = (above?, below?);
-    // The height between them, and the part above the centre, over both dx and over the top's.
+    // The height between them times both dx, and the part of it above the centre times the top's dx.
     let height = bottom.y * top.dx - top.y * bottom.dx;
     let part = yc * top.dx - top.y;
     Some([0, 1].map(|k| {
@@ -89,9 +88,9 @@ pub fn affine(polygon: &[Vertex], x: i32, y: i32) -> Option<[Coordinate; 2]> {
     }))
 }
 
-/// The texel of a perspective coordinate n / c in a texture of `size` texels: the quotient's floor,
-/// outside of the texture the nearest. On the horizon and beyond it, where c is not above zero, it
-/// is the one that the quotient runs off to before.
+/// The texel of a perspective coordinate n / c in a texture of `size` texels: the floor of the quotient,
+/// clamped to the texture. On the horizon and beyond it, where c is not above zero, it is the texel that the
+/// quotient tends to before the horizon.
 pub fn perspective(n: i128, c: i128, size: u16) -> u16 {
     let last = i128::from(size) - 1;
     let texel = match (n < 0, c > 0) {
@@ -102,12 +101,11 @@ pub fn perspective(n: i128, c: i128, size: u16) -> u16 {
     texel as u16
 }
 
-/// The three forms of the plane through `anchors` at the centre of a pixel: u = a / c and v = b / c
-/// in texels, as they are before anything is cut. Each anchor weighs what the ray's volume with the
-/// other two is.
+/// The three forms of the plane through `anchors` at the centre of a pixel, before quantisation: u = a / c
+/// and v = b / c in texels. The weight of each anchor is the volume of the ray with the other two anchors.
 ///
-/// Positions are within 2^24: a product of two is below 2^49 in each part, a weight below 2^61, a
-/// form below 2^92 (the focal length is at most 2^15).
+/// Positions are within 2^24: a product of two is below 2^49 in each part, a weight below 2^61, a form below
+/// 2^92 (the focal length is at most 2^15).
 pub fn forms(anchors: &[Anchor; 3], focal_length: i32, x: u16, y: u16) -> [i128; 3] {
     let ray = [
         2 * i128::from(x) - 319,

@@ -1,5 +1,5 @@
-//! The renderer's scans against the oracle: a few seconds of what `cargo sweep` does for as long
-//! as it is told to. What a sweep finds is pasted in here.
+//! The renderer's scans against the oracle: a few seconds of the cases that `cargo sweep` runs for a chosen
+//! time. Failures that a sweep finds are pasted in here.
 
 use std::fmt::Display;
 
@@ -17,7 +17,7 @@ fn polygon(points: &[(i32, i32)]) -> Vec<Point> {
     points.iter().map(|&(x, y)| Point { x, y }).collect()
 }
 
-/// Pixels compared; panics with a test to paste.
+/// Returns the number of compared pixels; panics with a test to paste.
 fn check(checker: &mut Checker, case: &Case, from: impl Display) -> u64 {
     checker.case(case).unwrap_or_else(|_| {
         let small = shrink(checker, case);

@@ -1,4 +1,4 @@
-//! The oracle itself, against big rationals and against its own definition.
+//! Checks the oracle itself against big rationals and against its own definition.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -9,7 +9,7 @@ use texmap::{MAX_COORDINATE, Point};
 /// Cases for the big numbers.
 const CASES: usize = 100_000;
 
-/// The definition again, in rationals: the crossing is computed, and then compared.
+/// The definition again, in rationals: computes the crossing, and then compares it.
 fn inside_in_rationals(polygon: &[Point], x: i32, y: i32) -> bool {
     let number = |n: i32, d: i32| BigRational::new(BigInt::from(n), BigInt::from(d));
     let half = number(1, 2);
@@ -48,7 +48,7 @@ fn the_oracle_agrees_with_big_rationals() {
         let mix = Mix::ALL[number % Mix::ALL.len()];
         let mut case = mix.case(seed, number as u64);
         let mut polygon = case.polygons.swap_remove(0);
-        // One in eight with its vertices at the limit or just inside.
+        // Every eighth polygon has its vertices at the limit or just inside.
         if number % 8 == 0 {
             let mut extreme =
                 || random.choice([-1, 1]).unwrap() * (MAX_COORDINATE - random.i32(0..2));
@@ -57,7 +57,7 @@ fn the_oracle_agrees_with_big_rationals() {
                 y: extreme(),
             });
         }
-        // A pixel by a vertex, a tie if one of some is one, or any.
+        // A pixel near a vertex, preferably a tie, or any pixel.
         let near = polygon[random.usize(..polygon.len())];
         let pixel = |random: &mut fastrand::Rng| {
             let (dx, dy) = (random.i32(-2..=2), random.i32(-2..=2));

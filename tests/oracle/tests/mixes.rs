@@ -1,4 +1,5 @@
-//! That the mixes are what their names say; what they are good for is seen when a scan is wrong.
+//! Checks that each mix has the property that its name states. Whether the mixes find errors shows when a
+//! scan is wrong.
 
 use oracle::mix::Mix;
 use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
@@ -35,7 +36,7 @@ fn keeps_its_promise(mix: Mix, p: &[Point]) -> bool {
             let (dx, dy) = (side[1].x - side[0].x, side[1].y - side[0].y);
             dx == 0 || dy == 0 || dx.abs() == dy.abs()
         }),
-        // All within 2/256 of the line through the two that are furthest apart.
+        // All within 2/256 of the line through the two points that are furthest apart.
         Mix::Slivers => {
             let length = |a: Point, b: Point| i64::from((b.x - a.x).abs().max((b.y - a.y).abs()));
             let pairs = p.iter().flat_map(|&a| p.iter().map(move |&b| (a, b)));
@@ -80,7 +81,7 @@ fn every_mix_is_what_its_name_says_and_legal() {
         match mix {
             _ if !seeded::is_whole() => {}
             Mix::Fans | Mix::Meshes => {}
-            // A triangle is convex, and one with a vertex in a side has four.
+            // A triangle is convex, and a triangle with a vertex in a side has four vertices.
             Mix::Crossing | Mix::Collinear => assert!(sides[4..=8].iter().all(|&seen| seen)),
             _ => assert!(sides[3..=8].iter().all(|&seen| seen), "{mix:?}"),
         }

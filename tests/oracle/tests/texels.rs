@@ -1,12 +1,12 @@
-//! The oracle of texture coordinates, checked itself: against big rationals and the one affine map
-//! of a triangle, on 10^5 pixels, extremes and vertices on pixels' centres among them.
+//! Checks the oracle of texture coordinates against big rationals and the single affine map of a triangle, on
+//! 10^5 pixels, including extremes and vertices on pixels' centres.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use oracle::texel::{Coordinate, affine};
 use texmap::{MAX_COORDINATE, Vertex};
 
-/// The one affine map of a triangle at a pixel's centre; none if the centre is not inside.
+/// Evaluates a triangle's affine map at a pixel's centre; `None` if the centre is not inside.
 fn by_weights(triangle: &[Vertex; 3], x: i32, y: i32) -> Option<[BigRational; 2]> {
     let big = |n: i64| BigRational::from_integer(BigInt::from(n));
     let centre = [x, y].map(|k| big(i64::from(k) * 256 + 128));
@@ -40,7 +40,7 @@ fn affine_coordinates_are_those_of_big_rationals() {
     let (mut compared, mut case) = (0, 0);
     while compared < seeded::cases(100_000) {
         case += 1;
-        // A pixel's worth, the screen's, and the whole range; on a grid that brings ties.
+        // The size of a pixel, of the screen, and of the whole range; on a grid that produces ties.
         let reach = [512, 100 * 256, MAX_COORDINATE][case % 3];
         let snap = [1, 128][case / 3 % 2];
         let mut vertex = || {
@@ -60,7 +60,8 @@ fn affine_coordinates_are_those_of_big_rationals() {
             let Some(expected) = by_weights(&triangle, x, y) else {
                 continue;
             };
-            // Where no column enters or leaves (its side is upright there), none is asked for.
+            // Where the triangle begins or ends at a column (its side is vertical there), no coordinates are
+            // needed.
             let Some(found) = affine(&triangle, x, y) else {
                 continue;
             };

@@ -1,14 +1,13 @@
-//! Random tests: where the seed and the number of cases come from.
+//! The seed and the number of cases of random tests.
 //!
-//! A random test calls [`generator`] once and draws everything from it. Each run has a fresh seed. If
-//! the test fails, its output names the seed and the command that repeats the run.
+//! A random test calls [`generator`] once and draws everything from it. Each run has a fresh seed. If the
+//! test fails, its output names the seed and the command that repeats the run.
 //!
 //! | variable | effect |
 //! | --- | --- |
-//! | `CRYSTAL_BALL_SEED` | every test takes this seed |
-//! | `CRYSTAL_BALL_CASES` | no test tries more cases than this, where its number of cases may vary ([`cases`]) |
-//!
-//! | `CRYSTAL_BALL_SEEDED` | a file to which each test that asks for a generator adds a line with its name |
+//! | `CRYSTAL_BALL_SEED` | every test uses this seed |
+//! | `CRYSTAL_BALL_CASES` | no test tries more cases than this, if its number of cases may vary ([`cases`]) |
+//! | `CRYSTAL_BALL_SEEDED` | a file to which each test that requests a generator adds a line with its name |
 //!
 //! `cargo soak` repeats the random tests of the whole workspace.
 #![forbid(unsafe_code)]
@@ -25,16 +24,16 @@ pub const SEED: &str = "CRYSTAL_BALL_SEED";
 /// The variable with the largest number of cases, a decimal number.
 pub const CASES: &str = "CRYSTAL_BALL_CASES";
 
-/// The variable with the file that learns which tests are random.
+/// The variable with the file that lists the random tests.
 pub const LOG: &str = "CRYSTAL_BALL_SEEDED";
 
-/// Returns the generator of a random test. Prints its seed, and the command that repeats the test with
-/// it: the test harness shows both if the test fails.
+/// Returns the generator of a random test. Prints its seed, and the command that repeats the test with that
+/// seed: the test harness shows both if the test fails.
 ///
 /// The generator's seed is [`Rng::get_seed`], until a number is drawn.
 ///
 /// # Panics
-/// If [`SEED`] is set, and not to a number.
+/// If [`SEED`] is set, but not to a number.
 pub fn generator() -> Rng {
     let seed = number(SEED).unwrap_or_else(|| fastrand::u64(..));
     if let (Some(log), Some(test)) = (env::var_os(LOG), thread::current().name()) {
@@ -52,16 +51,16 @@ pub fn generator() -> Rng {
     Rng::with_seed(seed)
 }
 
-/// Returns how many cases a random test tries: `usual`, or less if [`CASES`] says so, but 1 at least.
+/// Returns how many cases a random test tries: `usual`, or fewer if [`CASES`] says so, but at least 1.
 ///
 /// # Panics
-/// If [`CASES`] is set, and not to a number.
+/// If [`CASES`] is set, but not to a number.
 pub fn cases(usual: usize) -> usize {
     limit(usual, number(CASES))
 }
 
-/// Returns whether random tests try all of their cases. Only then is there enough for a test to assert
-/// that something rare was among them, or that a bound was nearly reached.
+/// Returns whether random tests try all of their cases. Only then may a test assert that a rare case
+/// occurred, or that a result came near its bound.
 pub fn is_whole() -> bool {
     env::var_os(CASES).is_none()
 }
@@ -97,7 +96,7 @@ fn command(seed: u64) -> String {
         (Err(_), Ok(program)) => command += &program.display().to_string(),
         (Err(_), Err(_)) => {}
     }
-    // The harness names a test's thread after the test; with one thread there is no such name.
+    // The harness names a test's thread after the test. With a single thread it gives no such name.
     match thread::current().name() {
         Some("main") | None => {}
         Some(test) => {

@@ -10,7 +10,7 @@ use crate::{Corner, Face, Mesh, Pose, Scene, Vec3, paint};
 
 /// Facets around: 15 degrees each, so that gold meridians lie along edges and do not kink.
 const SEGMENTS: usize = 24;
-/// Rings of facets from pole to pole: an odd number, so that the belt lies in the middle of one.
+/// Rings of facets from pole to pole: an odd number, so that the belt lies in the middle of a ring.
 const RINGS: usize = 15;
 const VERTICES: usize = (RINGS - 1) * SEGMENTS + 2;
 const FACES: usize = SEGMENTS * (2 + (RINGS - 2) * 2);
@@ -29,7 +29,7 @@ struct Solid {
     faces: [Face; FACES],
 }
 
-/// Built by the compiler: the boot image carries it, nothing is computed at the start.
+/// Built by the compiler: the boot image contains it, and nothing is computed at start-up.
 static SOLID: Solid = build();
 
 /// The ball.
@@ -49,7 +49,7 @@ pub const BALL: Entry<'static> = Entry {
 };
 const _: () = assert!(TEXELS <= MAX_TEXELS);
 
-/// The ball.
+/// The ball's mesh.
 const MESH: Mesh<'static> = Mesh {
     vertices: &SOLID.vertices,
     corners: &SOLID.corners,
@@ -64,7 +64,7 @@ pub fn paint_ball(texels: &mut [u8; TEXELS]) -> Texture<'_> {
         .enumerate()
     {
         for (i, texel) in row.iter_mut().enumerate() {
-            // The middle of the texel: a whole turn across, half a turn down.
+            // The centre of the texel: a whole turn across, half a turn down.
             let longitude = (((2 * i as u64 + 1) << 31) / u64::from(TEXTURE_WIDTH)) as u32;
             let polar = (((2 * j as u64 + 1) << 30) / u64::from(TEXTURE_HEIGHT)) as u32;
             *texel = paint::texel(longitude, polar, on_sphere(longitude, polar));
@@ -73,7 +73,7 @@ pub fn paint_ball(texels: &mut [u8; TEXELS]) -> Texture<'_> {
     Texture::new(texels, TEXTURE_WIDTH, TEXTURE_HEIGHT).expect("there are TEXELS texels")
 }
 
-/// The ball before its background. `textures` holds what [`paint_ball`] painted.
+/// The ball before its background. `textures` are those that [`paint_ball`] painted.
 pub fn ball<'t>(textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
     const _: () = assert!(BACKGROUND.len() == HEIGHT);
     Scene {
@@ -87,8 +87,8 @@ pub fn ball<'t>(textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
     }
 }
 
-/// The unit vector at a longitude (0 looks at the viewer, growing to the right) and a polar
-/// angle (0 is the top, half a turn the bottom), 30 fraction bits.
+/// The unit vector at a longitude (0 faces the viewer, growing to the right) and a polar angle (0 is the top,
+/// half a turn the bottom), 30 fraction bits.
 const fn on_sphere(longitude: u32, polar: u32) -> [i64; 3] {
     let ring = sin(polar);
     [
@@ -98,7 +98,7 @@ const fn on_sphere(longitude: u32, polar: u32) -> [i64; 3] {
     ]
 }
 
-/// 30 fraction bits cut to `bits`, rounded.
+/// Rounds 30 fraction bits to `bits`.
 const fn round(v: [i64; 3], bits: u32) -> Vec3 {
     let shift = 30 - bits;
     let half = 1 << (shift - 1);
@@ -117,8 +117,8 @@ const fn polar(ring: usize) -> u32 {
     ((ring as u64 * (1 << 31)) / RINGS as u64) as u32
 }
 
-/// The corner at ring line `ring` (0 and RINGS are the poles) and meridian `segment`, whose
-/// place in the texture is `half` half segments across: a pole takes the middle of its facet.
+/// The corner at ring line `ring` (0 and RINGS are the poles) and meridian `segment`. Its texture coordinate
+/// u is `half` half segments: a pole uses the middle of its facet.
 const fn corner(ring: usize, segment: usize, half: usize) -> Corner {
     let vertex = if ring == 0 {
         0
@@ -162,8 +162,8 @@ const fn build() -> Solid {
     while ring < RINGS {
         let mut segment = 0;
         while segment < SEGMENTS {
-            // The sphere's normal in the middle of the facet: both its triangles have it, so the
-            // cut between them does not show in the light.
+            // The sphere's normal at the facet's centre: both triangles have it, so the cut between them does
+            // not show in the light.
             let middle = (
                 longitude(segment) / 2 + longitude_end(segment) / 2,
                 polar(ring) / 2 + polar(ring + 1) / 2,
@@ -180,8 +180,8 @@ const fn build() -> Solid {
                     if ring + 1 == RINGS { centre } else { left },
                 ),
             );
-            // A trapezoid with a rectangle of the texture fits no one plane of texture: it is
-            // cut into triangles. At a pole one of the two is empty.
+            // The texture coordinates of a trapezoid with a rectangle of the texture do not fit one plane, so
+            // it is cut into triangles. At a pole one of the two is empty.
             let triangles = if ring == 0 {
                 [Some([a, c, d]), None]
             } else if ring + 1 == RINGS {
@@ -217,8 +217,8 @@ const fn build() -> Solid {
     }
 }
 
-/// The meridian on the right of a segment; the last one ends at a whole turn, which does not
-/// fit 32 bits and is one unit short.
+/// The meridian on the right of a segment. The last one ends at a whole turn, which does not fit 32 bits, so
+/// it is one unit short.
 const fn longitude_end(segment: usize) -> u32 {
     if segment + 1 == SEGMENTS {
         u32::MAX

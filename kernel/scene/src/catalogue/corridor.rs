@@ -1,9 +1,8 @@
 //! The corridor: two walls and a floor that go on to the horizon.
 //!
-//! Its textures are tiled: a tile is one unit wide, and a face has several. Faces meet at the same
-//! points on both sides of every edge, those of the floor at the walls' feet, so that no T-junction
-//! leaves a pixel out. Near the eye they are short and far away long; each takes the mipmap that
-//! fits it.
+//! Its textures are tiled: a tile is one unit wide, and a face has several. Faces on both sides of every edge
+//! meet at the same points (the floor meets the walls at their feet), so no T-junction leaves a pixel out.
+//! Faces are short near the eye and long far away; each uses the mipmap that fits it.
 
 use texmap::Texture;
 
@@ -17,7 +16,7 @@ use crate::{Corner, Face, Mesh, Pose, Vec3};
 
 /// Texels along each side of a tile.
 const TILE: u16 = 64;
-/// Most tiles that a face has along the corridor: as many as the longest texture.
+/// Most tiles of a face along the corridor: as many as the longest texture has.
 const LONGEST: i32 = Texture::MAX_SIDE as i32 / TILE as i32;
 
 /// Where faces meet, in units along the corridor; the eye is at -3 to -2.
@@ -27,7 +26,7 @@ const STATIONS: [i32; 24] = [
 const SEGMENTS: usize = STATIONS.len() - 1;
 const FACES: usize = 3 * SEGMENTS;
 
-/// Half the width, and how far below and above the eye floor and walls end, 16.16.
+/// Half the width, and the heights of the floor and of the walls' top relative to the eye (y down), 16.16.
 const SIDE: i32 = 1 << 16;
 const FLOOR: i32 = 3 << 14;
 const TOP: i32 = FLOOR - (2 << 16);
@@ -69,8 +68,8 @@ pub const MOIRE: Entry<'static> = Entry {
 /// A tile of the corridor's floor and walls, 16.16 units.
 const STEP: i32 = 1 << 16;
 
-/// A tile of the corridor forward in three quarters of a second, and a look to either side: seamless,
-/// since all tiles are alike.
+/// One tile forward in three quarters of a second, and a look to either side. The walk is seamless, since all
+/// tiles are alike.
 fn stroll(tick: u32) -> Pose {
     const TICKS: u32 = 45;
     Pose {
@@ -81,16 +80,17 @@ fn stroll(tick: u32) -> Pose {
     }
 }
 
-/// The corridor: textures 0 and 1 are those of [`paint`].
+/// The corridor's mesh: textures 0 and 1 are those of [`paint`].
 const MESH: Mesh<'static> = Mesh {
     vertices: &SOLID.vertices,
     corners: &SOLID.corners,
     faces: &SOLID.faces,
-    // What is inside of a convex solid hides nothing either.
+    // The inside of a convex solid hides nothing either.
     convex: true,
 };
 
-/// Vertices of a station: left and right on the floor, left and right above.
+/// Builds the corridor. Each station has four vertices: left and right on the floor, left and right at the
+/// top.
 const fn build() -> Solid {
     let empty = Corner {
         vertex: 0,
@@ -123,7 +123,7 @@ const fn build() -> Solid {
         assert!(tiles <= LONGEST);
         let (along, two) = ((tiles * (TILE as i32)) << 16, (2 * TILE as i32) << 16);
         let (near, far) = (4 * segment as u16, 4 * segment as u16 + 4);
-        // Clockwise as they are seen from between them, with their places in the texture.
+        // Clockwise as seen from inside the corridor, with their texture coordinates.
         let faces = [
             (
                 0,
@@ -179,7 +179,7 @@ const fn build() -> Solid {
     solid
 }
 
-/// Paints the tile of the floor and that of the walls.
+/// Paints the tile of the floor and the tile of the walls.
 fn paint(texels: &mut [u8; MAX_TEXELS]) -> Textures<'_> {
     const LEN: usize = TILE as usize * TILE as usize;
     let (floor, rest) = texels.split_at_mut(LEN);
@@ -201,7 +201,7 @@ fn paint(texels: &mut [u8; MAX_TEXELS]) -> Textures<'_> {
     [tiled(floor, 2 * TILE, most), tiled(wall, most, 2 * TILE)].into()
 }
 
-/// Marble slabs, dark and light, a gold line between them, and a diamond where four meet.
+/// Marble slabs, dark and light, with gold lines between them and a diamond where four meet.
 fn slabs(i: i64, j: i64) -> u8 {
     const HALF: i64 = TILE as i64 / 2;
     let from_line = |k: i64| (k % HALF).min(HALF - 1 - k % HALF);
@@ -216,7 +216,7 @@ fn slabs(i: i64, j: i64) -> u8 {
         return shade(Gold, 11);
     }
     let light = (i / HALF + j / HALF) % 2 == 0;
-    // Veins: where noise crosses its middle. Slabs are cut from one block each.
+    // Veins where noise crosses its middle. Each slab is cut from its own block.
     let block = [i / HALF * 97 + 5, j / HALF * 89 + 3];
     let at = [(i + block[0]) << 12, (j + block[1]) << 12, 0];
     let vein = (2 * fractal(at, 4, 61) - (1 << 16)).abs();
@@ -229,7 +229,7 @@ fn slabs(i: i64, j: i64) -> u8 {
     }
 }
 
-/// Courses of stone, each half a stone further than the one below, and a frieze.
+/// Courses of stone, each offset by half a stone from the one below, and a frieze.
 fn courses(i: i64, j: i64) -> u8 {
     const COURSE: i64 = 16;
     let (course, y) = (j / COURSE, j % COURSE);
@@ -249,7 +249,7 @@ fn courses(i: i64, j: i64) -> u8 {
     if x == 0 || y == 0 {
         return Indigo.shade(3);
     }
-    // Light from above left on each stone's edge.
+    // Light from the upper left on each stone's edge.
     let edge = i64::from(x == 1 || y == 1) * 4 - i64::from(x == 31 || y == 15) * 4;
     let own = part(hash([stone, course, 5], 71), 5);
     let grain = part(hash([i, j, 9], 73), 3);

@@ -21,14 +21,14 @@ pub const CUBE: Entry<'static> = Entry {
         yaw: turn(tick).wrapping_add(35 * DEGREE),
         pitch: turn(tick / 2).wrapping_add(30 * DEGREE),
         roll: turn(tick / 3),
-        // 2.25 to 4.25 units: its corners are 1.73 from the middle.
+        // 2.25 to 4.25 units: its corners are 1.73 from the centre.
         distance: units(13, 4) - (sin(turn(tick)) >> 14) as i32,
     },
     tile: 0,
 };
 
-/// Four vertices a side: front, right, back, left, top, bottom, each clockwise from its texture's
-/// top left as it is seen from outside.
+/// Four vertices a side: front, right, back, left, top, bottom, each clockwise from its texture's top left as
+/// seen from outside.
 #[rustfmt::skip]
 static CUBE_VERTICES: [Vec3; 24] = {
     const A: i32 = -units(1, 1);

@@ -43,9 +43,10 @@ pub const GRAZING_4096: Entry<'static> = Entry {
     tile: 0,
 };
 
-/// How far away a floor's far edge is: as far as an edge may be, but for the floor's own middle.
+/// The distance of a floor's far edge, 16.16: the largest distance that a pose may have. The floor's centre
+/// is nearer.
 const FAR_16: i32 = 128 << 16;
-/// The near edge is at a sixteenth of it, below the screen.
+/// The near edge is at a sixteenth of that distance, below the screen.
 const FLOOR_16_HALF: i32 = (FAR_16 - FAR_16 / 16) / 2;
 static FLOOR_16_VERTICES: [Vec3; 4] = lying(FLOOR_16_HALF, units(21, 4));
 const FLOOR_16: Mesh<'static> = lies(&FLOOR_16_VERTICES);

@@ -1,9 +1,9 @@
 //! The knot: a tube along a trefoil, which hides parts of itself.
 //!
-//! The curve winds on a torus, twice around its axis while three times around its tube. There the
-//! torus's own normal is one direction across the curve, and the other lies in the torus: both are
-//! known without a derivative, and come back to themselves after the whole way, so that the rings of
-//! the tube close without a twist.
+//! The curve winds on a torus, twice around its axis while three times around its tube. One direction across
+//! the curve is the torus's normal, and the other lies in the torus's surface. Both are known without a
+//! derivative. Both return to their start after the whole way, so the rings of the tube close without a
+//! twist.
 
 use texmap::Texture;
 
@@ -19,13 +19,13 @@ use crate::{Corner, Face, Mesh, Pose, Vec3};
 /// Rings along the curve, and corners of each.
 const RINGS: usize = 60;
 const SIDES: usize = 8;
-/// Rings that the texture goes along before it comes again: about as far as around the tube.
+/// Rings to one repetition of the texture: about as far as around the tube.
 const REPEAT: usize = 6;
 const VERTICES: usize = RINGS * SIDES;
 const FACES: usize = 2 * VERTICES;
 
-/// In hundredths of a unit: the torus's axis to its tube's middle, that to the curve, and the tube's
-/// radius.
+/// In hundredths of a unit: from the torus's axis to the centre of its tube, from there to the curve, and the
+/// radius of the knot's tube.
 const REACH: i64 = 64;
 const WINDING: i64 = 29;
 const TUBE: i64 = 17;
@@ -57,7 +57,7 @@ pub const KNOT: Entry<'static> = Entry {
     tile: 0,
 };
 
-/// The knot.
+/// The knot's mesh.
 const MESH: Mesh<'static> = Mesh {
     vertices: &SOLID.vertices,
     corners: &SOLID.corners,
@@ -65,13 +65,13 @@ const MESH: Mesh<'static> = Mesh {
     convex: false,
 };
 
-/// A place around the tube: the middle there and the direction outward, 30 fraction bits. `along`
-/// and `around` are fractions of the whole way.
+/// A point on the tube: the centre of its ring and the direction outward, 30 fraction bits. `along` and
+/// `around` are fractions of the whole way.
 const fn place(along: u32, around: u32) -> ([i64; 3], [i64; 3]) {
     let (phi, psi) = (along.wrapping_mul(2), along.wrapping_mul(3));
     let (cos_phi, sin_phi) = (cos(phi), sin(phi));
     let (cos_psi, sin_psi) = (cos(psi), sin(psi));
-    // From the torus's axis, and its normal: one direction across the curve.
+    // The distance from the torus's axis, and the torus's normal: one direction across the curve.
     let reach = (REACH << 30) / 100 + WINDING * cos_psi / 100;
     let middle = [
         mul(reach, cos_phi),
@@ -81,14 +81,14 @@ const fn place(along: u32, around: u32) -> ([i64; 3], [i64; 3]) {
     let normal = [mul(cos_psi, cos_phi), sin_psi, mul(cos_psi, sin_phi)];
     // The curve goes 2 reach along the axis's turn and 3 WINDING along the tube's.
     let (turn, wind) = (2 * reach, 3 * (WINDING << 30) / 100);
-    // 2^31 (2^31.8 at most) and its square, below 2^63.
+    // About 2^31 (2^31.1 at most); its square is below 2^63.
     let length = ((turn * turn + wind * wind) as u64).isqrt() as i64;
     let (turn, wind) = (
         ((turn as i128) << 30) / length as i128,
         ((wind as i128) << 30) / length as i128,
     );
     let (turn, wind) = (turn as i64, wind as i64);
-    // Across both: `turn` of the tube's direction, less `wind` of the axis's.
+    // Across both: `turn` of the tube's direction, minus `wind` of the axis's.
     let across = [
         mul(turn, -mul(sin_psi, cos_phi)) + mul(wind, sin_phi),
         mul(turn, cos_psi),
@@ -109,7 +109,7 @@ const fn turn(i: usize, n: usize) -> u32 {
     (((i as u64) << 32) / n as u64) as u32
 }
 
-/// 30 fraction bits cut to `bits`, rounded.
+/// Rounds 30 fraction bits to `bits`.
 const fn round(v: [i64; 3], bits: u32) -> Vec3 {
     let half = 1 << (29 - bits);
     [
@@ -119,7 +119,7 @@ const fn round(v: [i64; 3], bits: u32) -> Vec3 {
     ]
 }
 
-/// The corner of ring `ring` and side `side`, its place in the texture counted from ring `from`.
+/// The corner of ring `ring` and side `side`, with its texture coordinates counted from ring `from`.
 const fn corner(ring: usize, side: usize, from: usize) -> Corner {
     Corner {
         vertex: (ring % RINGS * SIDES + side % SIDES) as u16,
@@ -153,7 +153,7 @@ const fn build() -> Solid {
                 k += 1;
             }
             solid.vertices[ring * SIDES + side] = round(point, 16);
-            // Both halves of a facet have the tube's normal in its middle.
+            // Both halves of a facet have the tube's normal at the facet's centre.
             let (_, out) = place(turn(2 * ring + 1, 2 * RINGS), turn(2 * side + 1, 2 * SIDES));
             let normal = round(out, 14);
             let corners = [
@@ -183,7 +183,7 @@ const fn build() -> Solid {
     solid
 }
 
-/// Paints the tube's texture, whose opposite borders fit each other.
+/// Paints the tube's texture, whose opposite borders match.
 fn paint(texels: &mut [u8; MAX_TEXELS]) -> Texture<'_> {
     surfaces::paint(texels, ribbon)
 }
@@ -191,13 +191,13 @@ fn paint(texels: &mut [u8; MAX_TEXELS]) -> Texture<'_> {
 /// A gold band around enamel, wound once about the tube, with pearls between two wires.
 fn ribbon(i: i64, j: i64) -> u8 {
     const AROUND: i64 = SIDE as i64;
-    // Across the band, 0 to 255: it is wound once for each repeat.
+    // Across the band, 0 to 255: it is wound once for each repetition.
     let across = (i + j).rem_euclid(AROUND);
     let from_band = (across - 128).abs();
     let bevel = |middle: i64, wide: i64| 17 - (middle.abs() * 9 / wide) + (middle < 0) as i64 * 3;
     match from_band {
         0..18 => {
-            // Along the band, a pearl every 32 texels; the band goes along i - j.
+            // Along the band, a pearl every 32 texels; the band runs along i - j.
             let along = (i - j).rem_euclid(32) - 16;
             let (x, y) = (along * 7 / 10, (across - 128) * 7 / 10);
             let radius = x * x + y * y;
@@ -213,7 +213,7 @@ fn ribbon(i: i64, j: i64) -> u8 {
         18..30 => shade(Gold, bevel(from_band - 24, 6)),
         30..32 => Indigo.shade(2),
         _ => {
-            // Enamel without a seam: noise on a torus of its own.
+            // Enamel without a seam: noise on a separate torus.
             let angle = |k: i64| (k as u32).wrapping_mul(1 << 24);
             let reach = (5i64 << 30) / 2 + cos(angle(j));
             let on_torus = [

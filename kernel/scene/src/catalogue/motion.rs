@@ -17,8 +17,8 @@ pub const fn turn(tick: u32) -> u32 {
     tick.wrapping_mul(((1u64 << 32) / 720) as u32)
 }
 
-/// Up to `degrees` to either side and back in 12 s. At tick 0 it is on its way, so that nothing
-/// is level.
+/// Swings by up to `degrees` to either side and back in 12 s. At tick 0 the swing is under way, so that
+/// nothing is level.
 pub fn sway(tick: u32, degrees: u32) -> u32 {
     let sine = sin(turn(tick).wrapping_add(QUARTER / 2));
     ((sine * i64::from(degrees * DEGREE)) >> 30) as u32

@@ -1,10 +1,10 @@
-//! Faces of four corners that show the whole of a texture.
+//! Four-cornered faces that show a whole texture.
 
 use super::surfaces::SIDE;
 use crate::{Corner, Face, Mesh, Vec3};
 
-/// A square that lies `y` below the eye, `half` to either side and as far to the front and back.
-/// The texture's top is far away, so that writing is read from the near edge.
+/// A square that lies `y` below the origin and extends by `half` to either side, to the front and to the
+/// back. The texture's top is far away, so that its text reads from the near edge.
 pub const fn lying(half: i32, y: i32) -> [Vec3; 4] {
     [
         [-half, y, half],
@@ -14,7 +14,8 @@ pub const fn lying(half: i32, y: i32) -> [Vec3; 4] {
     ]
 }
 
-/// The whole texture on four vertices from `first` on, clockwise from its top left.
+/// The corners of faces that show the whole texture, four vertices a face, clockwise from the texture's top
+/// left.
 pub const fn corners<const N: usize>() -> [Corner; N] {
     let side = (SIDE as i32) << 16;
     let places = [(0, 0), (side, 0), (side, side), (0, side)];

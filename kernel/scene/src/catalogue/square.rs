@@ -1,4 +1,4 @@
-//! A square: `facing` looks at the viewer, `tilted` leans.
+//! A square: `facing` faces the viewer, `tilted` leans.
 
 use super::motion::{DEGREE, QUARTER, turn, units};
 use super::quad::{lies, lying};
@@ -7,7 +7,7 @@ use crate::colour::BACKGROUND;
 use crate::entry::{Colours, Cover, Entry};
 use crate::{Mesh, Pose, Vec3};
 
-/// The square in one depth, turning.
+/// The square at one depth, turning.
 pub const FACING: Entry<'static> = Entry {
     name: "facing",
     about: "a square that faces the viewer and turns: no perspective at all",

@@ -1,6 +1,6 @@
-//! The textures of the measuring scenes, drawn by code: a dial, a board, a plain, a wall of bricks
-//! and the side of a crate. Each has lines, which show every bend, and writing, which shows which
-//! way round it is.
+//! The textures of the measuring scenes, drawn by code: a dial, a board, a plain, a wall of bricks and the
+//! side of a crate. Each has lines, which show every bend. The dial and the board also have text, which shows
+//! a texture that is mirrored or turned.
 
 use texmap::Texture;
 
@@ -13,7 +13,7 @@ use crate::trig::{cos, sin};
 /// Texels across, and down.
 pub const SIDE: usize = 256;
 
-/// Paints a texture texel by texel: `texel` has the colour of column i and row j.
+/// Paints a texture texel by texel: `texel` returns the colour of column i and row j.
 pub fn paint(texels: &mut [u8; MAX_TEXELS], texel: fn(i64, i64) -> u8) -> Texture<'_> {
     for (j, row) in texels.chunks_exact_mut(SIDE).enumerate() {
         for (i, colour) in row.iter_mut().enumerate() {
@@ -23,19 +23,19 @@ pub fn paint(texels: &mut [u8; MAX_TEXELS], texel: fn(i64, i64) -> u8) -> Textur
     Texture::new(texels, SIDE as u16, SIDE as u16).expect("there are SIDE x SIDE texels")
 }
 
-/// A shade of a ramp, kept to what leaves the highlight room.
+/// A shade of a ramp, limited so that the highlight has room.
 pub fn shade(ramp: Ramp, shade: i64) -> u8 {
     ramp.shade(shade.clamp(1, 22) as usize)
 }
 
-/// So many steps of what runs from 0 to [`ONE`]: 0 to `steps` - 1.
+/// Divides 0 to [`ONE`] into `steps` steps and returns the step of `value`: 0 to `steps` - 1.
 pub fn part(value: i64, steps: i64) -> i64 {
     (value * steps) >> 16
 }
 
-/// The direction of a place about the middle, as a fraction of a turn: 0 is up, clockwise.
+/// The direction of a point about the centre, as a fraction of a turn: 0 is up, clockwise.
 fn direction(dx: i64, dy: i64) -> u32 {
-    // Into the quarter from up to right.
+    // Rotates the point into the quarter from up to right.
     let (quarter, x, y) = match (dx >= 0, dy < 0) {
         (true, true) => (0, dx, -dy),
         (true, false) => (1, dy, dx),
@@ -52,8 +52,8 @@ fn direction(dx: i64, dy: i64) -> u32 {
     (angle.min((1 << 30) - 1)) + quarter * (1 << 30)
 }
 
-/// How far an angle is from the nearest of `n` directions evenly around, and on which side: 0 to
-/// 2^31, for half the way to the next one.
+/// The distance of an angle from the nearest of `n` evenly spaced directions, and on which side it lies: 0 to
+/// 2^31, which is half the way to the next direction.
 fn from_ray(angle: u32, n: u32) -> (i64, bool) {
     let folded = angle.wrapping_mul(n);
     (
@@ -64,12 +64,12 @@ fn from_ray(angle: u32, n: u32) -> (i64, bool) {
 
 /// A compass dial in gold, silver and enamel.
 pub fn dial(i: i64, j: i64) -> u8 {
-    // From the middle, in half texels: odd numbers.
+    // From the centre, in half texels: odd numbers.
     let (dx, dy) = (2 * i - 255, 2 * j - 255);
     let radius = (dx * dx + dy * dy).isqrt();
     let angle = direction(dx, dy);
     let edge = dx.abs().max(dy.abs());
-    // Light from the upper left, as on everything here.
+    // Light from the upper left, as everywhere in this file.
     let lit = if dx + dy < 0 { 4 } else { 0 };
     if edge >= 240 {
         return match edge {
@@ -80,7 +80,7 @@ pub fn dial(i: i64, j: i64) -> u8 {
     let cloud = |grain: i64| fractal([i * grain, j * grain, 0], 4, 7);
     match radius {
         ..26 => {
-            // A ball of crystal: a highlight, and light that has come through it.
+            // A crystal ball: a highlight, and light that has passed through it.
             let highlight = (dx + 9).pow(2) + (dy + 9).pow(2);
             let through = (dx - 10).pow(2) + (dy - 10).pow(2);
             shade(Azure, (22 - highlight / 14).max(16 - through / 16).max(6))
@@ -115,7 +115,7 @@ pub fn dial(i: i64, j: i64) -> u8 {
         185..226 => {
             let letter = ['N', 'E', 'S', 'W'];
             let nearest = angle.wrapping_add(1 << 29) >> 30;
-            // Upright for who stands in the middle and looks outward.
+            // Upright for a viewer who stands at the centre and looks outward.
             let (across, out) = match nearest {
                 0 => (dx, -dy),
                 1 => (dy, dx),
@@ -152,7 +152,7 @@ pub fn dial(i: i64, j: i64) -> u8 {
     }
 }
 
-/// As in a star of four points, turned by an eighth of a turn.
+/// As `in_point` in [`dial`] for a star of four points, turned by an eighth of a turn.
 fn in_point_turned(angle: u32, radius: i64, tip: i64, valley: i64) -> bool {
     let (from_axis, _) = from_ray(angle.wrapping_add(1 << 29), 4);
     radius * (valley + (((tip - valley) * from_axis) >> 31)) < tip * valley
@@ -166,7 +166,7 @@ fn side_turned(angle: u32, dark: i64, light: i64) -> i64 {
 /// Tiles of the board in a row.
 const TILES: i64 = 8;
 
-/// A board of eight by eight marble tiles, each with its place.
+/// A board of eight by eight marble tiles, each labelled with its place.
 pub fn board(i: i64, j: i64) -> u8 {
     let side = SIDE as i64 / TILES;
     let (column, row) = (i / side, j / side);
@@ -174,7 +174,7 @@ pub fn board(i: i64, j: i64) -> u8 {
     let dark = (column + row) % 2 == 0;
     let from_edge = x.min(y).min(side - 1 - x).min(side - 1 - y);
     if from_edge == 0 {
-        // The joint: gold, as in an inlay; brighter around the whole.
+        // The joint: gold, as in an inlay; brighter at the outer border.
         let border = i == 0 || j == 0 || i == 255 || j == 255;
         return shade(Gold, if border { 18 } else { 13 });
     }
@@ -192,7 +192,7 @@ pub fn board(i: i64, j: i64) -> u8 {
             Indigo.shade(4)
         };
     }
-    // Every tile is cut from another place of the stone.
+    // Each tile is cut from another place of the stone.
     let cut = hash([column, row, 3], 5) * 97;
     let place = [i * 5200 + cut, j * 5200, cut];
     let push = fractal(place.map(|c| c / 2), 3, 31) - ONE / 2;
@@ -210,12 +210,12 @@ pub fn board(i: i64, j: i64) -> u8 {
     }
 }
 
-/// A plain of small tiles that fills with detail wherever it is looked at: near the eye a texel is
-/// a tile, far away whole fields are.
+/// A plain of small tiles with detail at every distance: near the eye a texel is a tile, far away a whole
+/// field is.
 pub fn plain(i: i64, j: i64) -> u8 {
     let (field_x, field_y) = (i / 16, j / 16);
     let (x, y) = (i % 16, j % 16);
-    // Roads around each field, and a great one through the middle.
+    // Roads around each field, and a wide road through the centre.
     if i == 127 || i == 128 {
         return shade(Gold, if j % 2 == 0 { 21 } else { 15 });
     }
@@ -252,7 +252,7 @@ pub fn bricks(i: i64, j: i64) -> u8 {
     if dy < sill && outline < 84 {
         let depth = (84 - outline).min(sill - dy);
         if depth < 22 {
-            // Stones around it, a joint between each two.
+            // Stones around it, with a joint between each two.
             let along = if dy < 0 {
                 i64::from(direction(dx, dy) >> 20) / 170
             } else {
@@ -310,7 +310,7 @@ pub fn bricks(i: i64, j: i64) -> u8 {
     }
 }
 
-/// The side of a crate: boards, iron at the corners, and a crystal ball on the lid.
+/// The side of a crate: boards, iron at the corners, and a crystal ball as an emblem.
 pub fn crate_side(i: i64, j: i64) -> u8 {
     let (dx, dy) = (2 * i - 255, 2 * j - 255);
     let edge = 255 - dx.abs().max(dy.abs());
@@ -381,7 +381,7 @@ fn emblem(dx: i64, dy: i64, radius: i64) -> u8 {
     if ball < 71 {
         return Indigo.shade(2);
     }
-    // Its foot.
+    // The ball's foot.
     if dy > 48 && dy < 80 && dx.abs() < 18 + (dy - 48) {
         return shade(Gold, 19 - (dx + 40) / 10);
     }

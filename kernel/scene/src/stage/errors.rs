@@ -1,4 +1,4 @@
-//! Pictures of the errors that mappers make.
+//! Frames that show the errors of mappers.
 
 use core::ops::Range;
 
@@ -11,11 +11,11 @@ use super::{Stage, lit, polygons};
 use crate::Pose;
 
 impl Stage<'_> {
-    /// Draws the solid as [`Stage::draw`] does, but each pixel in the colour of its error: how far
-    /// the mapper's coordinates are from the exact quotients, either of them at most, in 2^-16 texel.
-    /// Whole columns beside `columns` may be left out. Returns the largest error in `columns`.
+    /// Draws the solid as [`Stage::draw`] does, but colours each pixel by the mapper's error there: the
+    /// larger of the differences in u and v from the exact quotients, in 2^-16 texel. Columns outside
+    /// `columns` may be left out. Returns the largest error in `columns`.
     ///
-    /// In polygon order always: the error is looked at, not what it costs.
+    /// The order is always polygon by polygon: this view shows errors, not costs.
     pub fn draw_errors(
         &mut self,
         pose: &Pose,
@@ -59,7 +59,7 @@ impl Stage<'_> {
                     });
                     run.draw(destination);
                 };
-                // What is outside the legal range is not drawn otherwise, either.
+                // A face outside the legal range is not drawn in a normal frame either.
                 let _ = quality
                     .mapper(&face)
                     .jobs(&face, &texture, |job| match self.mesh.convex {
@@ -72,7 +72,7 @@ impl Stage<'_> {
     }
 }
 
-/// Pixels below each other that are not drawn yet.
+/// A vertical strip of pixels that is not drawn yet.
 struct Run {
     place: (u16, u16),
     colours: [u8; HEIGHT],
@@ -88,7 +88,7 @@ impl Run {
         }
     }
 
-    /// Adds a pixel; what it does not continue is drawn first.
+    /// Adds a pixel. If the pixel does not continue the strip, the strip is drawn first.
     fn push(&mut self, place: (u16, u16), colour: u8, destination: &mut impl Destination) {
         if place != (self.place.0, self.place.1 + self.len) {
             self.draw(destination);
@@ -98,7 +98,7 @@ impl Run {
         self.len += 1;
     }
 
-    /// Draws what there is.
+    /// Draws the strip and empties it.
     fn draw(&mut self, destination: &mut impl Destination) {
         let (x, y) = self.place;
         if self.len > 0 {
@@ -129,7 +129,7 @@ mod tests {
         check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
     }
 
-    /// The largest error of a picture. Every pixel of it has one, and no other pixel has.
+    /// The largest error of a frame. Every pixel of the solid has an error, and no other pixel has.
     fn largest(stage: &mut Stage<'_>, pose: &Pose) -> u32 {
         let mut drawn = Box::new(PlanarBuffer::new());
         let stats = stage.draw(pose, &mut *drawn);
@@ -137,13 +137,13 @@ mod tests {
         let found = stage.draw_errors(pose, 0..WIDTH as u16, |_| 1, &mut *page);
         let with = page.planes.as_flattened().iter().filter(|&&byte| byte == 1);
         assert_eq!(with.count(), stats.pixels as usize);
-        // Of a part the largest is no larger.
+        // The largest error of a part is at most that of the whole.
         assert!(stage.draw_errors(pose, 108..212, |_| 0, &mut *page) <= found);
         found
     }
 
-    /// As measured by other means: `shifts` is off by some fifty texels on the tilted board, `within-T`
-    /// by T at most, the exact mapper nowhere.
+    /// The errors agree with other measurements: `shifts` is off by some fifty texels on the tilted board,
+    /// `within-T` by at most T, and the exact mapper nowhere.
     #[test]
     fn errors_are_those_of_the_mapper() {
         staged("tilted", |entry, stage| {
@@ -162,7 +162,7 @@ mod tests {
         });
     }
 
-    /// Of a solid that hides parts of itself those that are seen.
+    /// A solid that hides parts of itself has errors at its visible pixels only.
     #[test]
     fn hidden_surfaces_have_no_error() {
         staged("knot", |entry, stage| {

@@ -1,34 +1,34 @@
-//! How the texture moves on the screen, from one picture to the next.
+//! How the texture moves on the screen from one frame to the next.
 //!
 //! # The sweet spot
 //!
-//! Chapter 57 tells of a speed at which the eye takes pictures for motion, between one that is too slow
-//! and one that is too fast, and leaves finding it to experience. Here both ends are measured.
+//! Chapter 57 describes a range of speeds, neither too slow nor too fast, at which the eye sees frames as
+//! motion, and leaves finding the range to experience. Here both ends are measured.
 //!
-//! Too slow: a texture's edge is drawn in whole pixels, so it does not glide, it steps, a pixel at a
-//! time. Pictures that come fewer than some twelve a second are seen one by one ([`STEPS_A_SECOND`]);
-//! so are these steps, and every edge, stepping in its own time, is seen to crawl.
+//! Too slow: a texture's edge is drawn in whole pixels, so it does not glide but moves in steps of a pixel.
+//! The eye sees images that come at fewer than some twelve a second one by one ([`STEPS_A_SECOND`]). It sees
+//! such steps one by one too, and since every edge steps at its own time, the edges seem to crawl.
 //!
-//! Too fast: the eye joins an edge to the nearest like it in the picture before. Moved on by half a
-//! period, a pattern lies as far ahead of the one before as behind it, and further it seems to run
-//! backward.
+//! Too fast: the eye connects an edge with the nearest similar edge in the previous frame. If a pattern moves
+//! by half a period, it lies as far ahead of its previous place as behind it; if it moves further, it seems
+//! to run backward.
 //!
-//! So the median motion of all that is seen, in pixels from picture to picture, has to lie between
-//! the two. It scales with the speed of turning, and so do the ends with the rate of pictures: where
-//! one is in the range says how much faster or slower it may turn.
+//! So the median motion of all visible pixels, in pixels from frame to frame, has to lie between the two
+//! ends. The motion scales with the speed of turning, and the ends scale with the frame rate. The motion's
+//! place in the range therefore says how much faster or slower the solid may turn.
 //!
 //! # The motion
 //!
-//! Of a pixel's texture coordinates before and after; and of their slopes, which say how many pixels
-//! that is. Both come from the faces' planes, as the exact mapper's do. On a grid of pixels, since it
-//! is a median that is looked for, and from the faces that are seen alone.
+//! The motion of a pixel follows from its texture coordinates before and after, and from their slopes, which
+//! convert texels to pixels. Both come from the faces' planes, as the exact mapper's coordinates do. Since a
+//! median is wanted, a grid of pixels is enough. Only visible faces count.
 //!
 //! # The period
 //!
-//! Of a pattern of many periods the finest matter: that of the root mean square frequency is taken,
-//! along u or v, whichever is shorter. For one wave it is its period. With d the mean square of what a
-//! texel differs by from the next one, and s that of what it differs by from the mean, a wave of w
-//! radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
+//! In a pattern of many periods the finest matter. The period here is that of the root mean square frequency
+//! along u or v, whichever is shorter. For a single wave it is the wave's period. Let d be the mean square
+//! difference between a texel and the next, and s the mean square difference between a texel and the mean. A
+//! wave of w radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
 
 use modex::{HEIGHT, Palette, WIDTH};
 use texmap::coverage::{Axis, spans};
@@ -40,27 +40,27 @@ use crate::pose::Orientation;
 use crate::trig::sin;
 use crate::{FOCAL_LENGTH, Pose, Vec3};
 
-/// Pictures a second that are seen one by one, and no longer as motion. (P. Read and M.-P. Meyer,
-/// Restoration of Motion Picture Film, 2000: 10 to 12.)
+/// Images a second that the eye still sees one by one, not as motion. (P. Read and M.-P. Meyer, Restoration
+/// of Motion Picture Film, 2000: 10 to 12.)
 pub const STEPS_A_SECOND: u32 = 12;
 
-/// Pixels from a sample to the next, either way.
+/// Pixels from one sample to the next, in x and y.
 const GRID: u16 = 8;
 /// Most samples.
 const SAMPLES: usize = WIDTH / GRID as usize * (HEIGHT / GRID as usize);
 
-/// How what is seen of a texture moves in a tick: medians.
+/// The motion of the visible texture in one tick: medians over the sampled pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
     /// On the screen, in 2^-16 pixel.
     pub pixels: u32,
-    /// In the texture, as a part of half its period, 2^-16.
+    /// In the texture, as a fraction of half its period, in 2^-16.
     pub part: u32,
 }
 
 impl Motion {
-    /// What the eye joins: the least and most pixels from picture to picture, 16.16, at so many ticks
-    /// a picture, 16.16. Nothing if nothing moves in the texture.
+    /// Returns the least and most pixels from frame to frame, 16.16, that the eye sees as motion. A frame
+    /// lasts `ticks` ticks, 16.16. Returns `None` if nothing moves in the texture.
     pub fn sweet_spot(&self, ticks: u32, ticks_a_second: u32) -> Option<(u32, u32)> {
         let least = u64::from(STEPS_A_SECOND) * u64::from(ticks) / u64::from(ticks_a_second);
         let most = (u64::from(self.pixels) << 16).checked_div(u64::from(self.part))?;
@@ -68,7 +68,7 @@ impl Motion {
     }
 }
 
-/// From the solid's place in one pose to that in another.
+/// The motion from one pose of the solid to another.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Move {
     from: (Orientation, i32),
@@ -81,7 +81,7 @@ impl Move {
         Self { from, to }
     }
 
-    /// Where a point of the viewer's space comes to lie, to within some 2^-16 unit.
+    /// The place to which a point of view space moves, to within some 2^-16 unit.
     fn point(&self, [x, y, z]: Vec3) -> Vec3 {
         let (from, to) = (&self.from, &self.to);
         let [x, y, z] = to.0.turn(from.0.turn_back([x, y, z - from.1]));
@@ -95,16 +95,17 @@ impl Move {
         })
     }
 
-    /// Whether the motion hides errors of a face's texture: if one of its points moves by half a pixel
-    /// or more, and the face does not move in its own plane. There a texture glides on as it is, and
-    /// a bend that stands still in it is seen.
+    /// Whether the motion hides a mapper's errors in a face's texture: one of the face's points moves by half
+    /// a pixel or more, and the face does not move in its own plane. In its own plane the texture glides on
+    /// unchanged, and the eye sees a bend that stands still in the texture.
     pub fn hides_errors(&self, anchors: &[Anchor; 3]) -> bool {
         let places = anchors.map(|anchor| anchor.position.map(i64::from));
         let ways = anchors.map(|anchor| {
             let to = self.point(anchor.position);
             [0, 1, 2].map(|k| i64::from(to[k]) - i64::from(anchor.position[k]))
         });
-        // What is beside or behind the eye has no place on the screen, and moves fast where it has.
+        // A point beside or behind the eye has no place on the screen, and it moves fast when it comes into
+        // view.
         let moves = places.iter().zip(&ways).any(|(place, way)| {
             2 * i64::from(FOCAL_LENGTH) * way[0].abs().max(way[1].abs()) >= place[2]
         });
@@ -113,7 +114,8 @@ impl Move {
             let j = (i + 1) % 3;
             a[i] * b[j] - a[j] * b[i]
         });
-        // Below 2^51 before, and below 2^24 then: a square of it with one of a way, 2^26, fits.
+        // The cross product's entries are below 2^51, and below 2^24 after the shift. The square of such an
+        // entry times the square of a `way`, below 2^26, then fits.
         let largest = cross
             .iter()
             .fold(0, |most, k: &i64| most.max(k.unsigned_abs()));
@@ -128,16 +130,16 @@ impl Move {
     }
 }
 
-/// Which mapper a face is drawn by.
+/// Chooses the mapper of each face.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Quality {
     mapper: Mapper,
-    /// The faster one, and what hides its errors.
+    /// The faster mapper, and the motion that hides its errors.
     lower: Option<(Mapper, Move)>,
 }
 
 impl Quality {
-    /// By `mapper`; or lower where the motion to `next` hides it.
+    /// Full quality with `mapper`, or reduced quality where the motion from `pose` to `next` hides it.
     pub fn of(mapper: Mapper, pose: &Pose, next: Option<&Pose>) -> Self {
         let next = next.filter(|next| *next != pose);
         let lower = mapper.lower().zip(next);
@@ -147,7 +149,7 @@ impl Quality {
         }
     }
 
-    /// The face's mapper.
+    /// The mapper for a face.
     pub fn mapper(&self, face: &Face<'_>) -> Mapper {
         match self.lower {
             Some((lower, moved)) if moved.hides_errors(&face.anchors) => lower,
@@ -156,18 +158,18 @@ impl Quality {
     }
 }
 
-/// Half the period of a texture's root mean square frequency, 16.16 texels, 1 and more. A texture of
-/// one colour has none.
+/// Half the period of a texture's root mean square frequency, 16.16 texels, at least 1. Returns `None` for a
+/// texture of one colour.
 pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u32> {
     let sides = texture
         .tile()
         .unwrap_or((texture.width(), texture.height()));
     let (width, height) = (usize::from(sides.0), usize::from(sides.1));
-    // Luma, the usual weights in sixteenths.
+    // Luma: the usual weights in sixteenths.
     let luma = palette.map(|[r, g, b]| 5 * i64::from(r) + 9 * i64::from(g) + 2 * i64::from(b));
     let pitch = usize::from(texture.pitch());
     let at = |i: usize, j: usize| luma[usize::from(texture.texels()[j * pitch + i])];
-    // Every scene passes here before its first picture: no division for a texel.
+    // Every scene passes through here before its first frame, so the loop does no division per texel.
     let after = |i: usize, side: usize| if i + 1 == side { 0 } else { i + 1 };
     let (mut sum, mut squares, mut across, mut down) = (0, 0, 0, 0);
     for j in 0..height {
@@ -179,7 +181,7 @@ pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
             down += (at(i, after(j, height)) - here).pow(2);
         }
     }
-    // Below 65 536 texels of 2^10 squared, once more times 65 536: fits.
+    // At most 65 536 texels with a luma below 2^10: the square of the sum is below 2^52 and fits.
     let texels = (width * height) as i64;
     let spread = squares - sum * sum / texels;
     let differences = across.max(down);
@@ -188,7 +190,7 @@ pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
     }
     // sin^2(w / 2), 60 fraction bits.
     let ratio = ((i128::from(differences) << 60) / (4 * i128::from(spread))).min(1 << 60);
-    // w / 2 as a fraction of a turn, from the top bit down; a quarter at most.
+    // w / 2 as a fraction of a turn, from the top bit down; at most a quarter.
     let mut angle = 0u32;
     for bit in (0..30).rev() {
         let next = angle | 1 << bit;
@@ -201,8 +203,7 @@ pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
 }
 
 impl Stage<'_> {
-    /// How what is seen of the texture in `pose` moves to `next`. Nothing if there is not enough to
-    /// be seen to tell.
+    /// Returns how the visible texture in `pose` moves to `next`, or `None` if too little of it is visible.
     pub fn motion(&mut self, pose: &Pose, next: &Pose) -> Option<Motion> {
         if !self.mesh.convex {
             self.find_visible(pose);
@@ -223,7 +224,7 @@ impl Stage<'_> {
                 let size = (texture.width(), texture.height());
                 let before = face.plane();
                 let after = Plane::new(&moved.anchors(&face.anchors), FOCAL_LENGTH);
-                // What is outside the legal range is not seen.
+                // A face outside the legal range is not visible.
                 let _ = spans(Axis::Down, face.polygon, |run| {
                     if run.line % GRID != GRID / 2 {
                         return;
@@ -253,14 +254,14 @@ impl Stage<'_> {
     }
 }
 
-/// How far the texture moves at a pixel: on the screen, 16.16 pixels, and in itself, 16.16 texels.
-/// Nothing where a border of the texture is near, or its slopes leave no direction.
+/// How far the texture moves at a pixel: on the screen, in 16.16 pixels, and in the texture, in 16.16 texels.
+/// Returns `None` near a border of the texture, and where its slopes give no direction.
 fn sample(before: &Plane, after: &Plane, size: (u16, u16), x: u16, y: u16) -> Option<(u32, u32)> {
     let at = |plane: &Plane, x: u16, y: u16| {
         let c = plane.c.at(x, y);
         let inside = |n: i64, size: u16| {
             let found = coordinate(n, c, size);
-            // The borders themselves are where all that lies beyond is brought.
+            // Coordinates beyond the texture are clamped to its borders, so a border value may be wrong.
             (found > 0 && found < (i32::from(size) << 16) - 1).then_some(i64::from(found))
         };
         Some((
@@ -298,7 +299,7 @@ mod tests {
         core::array::from_fn(|i| [i as u8 / 4; 3])
     }
 
-    /// Half the period of a texture whose texel has the brightness of 0 to 255.
+    /// Half the period of a texture whose texels have a brightness of 0 to 255.
     fn half_period_of(side: u16, texel: impl Fn(f64, f64) -> f64) -> Option<f64> {
         let places = (0..side).flat_map(|j| (0..side).map(move |i| (i, j)));
         let texels: Vec<u8> = places
@@ -340,8 +341,8 @@ mod tests {
         }
     }
 
-    /// The median motion by another way: each pixel's ray to the face that is seen there, in floating
-    /// point, and from there with the solid to where it is seen next. On a finer grid.
+    /// The median motion, found another way: a ray from each pixel to the visible face, in floating point,
+    /// moves with the solid to its next place on the screen. The grid is finer.
     fn median_by_rays(stage: &mut Stage<'_>, pose: &Pose, next: &Pose) -> f64 {
         let rows = |pose: &Pose| {
             let orientation = pose.orientation();
@@ -404,8 +405,9 @@ mod tests {
         ways[ways.len() / 2]
     }
 
-    /// Where the default turn of each scene lies. What sways stands still at either end of its way, and
-    /// is slow all the time: its floors and its wall are there to be looked at, not to turn.
+    /// The default turn of each scene lies in the sweet spot, but for the scenes that sway. They stand still
+    /// at both ends of their way and are slow throughout: their floors and wall are there to be looked at,
+    /// not to turn.
     #[test]
     fn the_default_turn_lies_in_the_sweet_spot() {
         staged(|entry, stage| {
@@ -442,7 +444,7 @@ mod tests {
         });
     }
 
-    /// Twice as many ticks a picture, and steps come twice as slowly.
+    /// If a frame lasts more ticks, steps come more slowly, and the least motion grows.
     #[test]
     fn the_sweet_spot_scales_with_the_rate_of_pictures() {
         let motion = Motion {
@@ -454,7 +456,7 @@ mod tests {
         assert_eq!(Motion { part: 0, ..motion }.sweet_spot(1 << 16, 60), None);
     }
 
-    /// What turns in its own plane is never lower, whatever it is drawn by; what tumbles is.
+    /// A face that turns in its own plane keeps its quality with every mapper; a face that tumbles does not.
     #[test]
     fn a_face_that_moves_in_its_own_plane_keeps_its_quality() {
         staged(|entry, stage| {

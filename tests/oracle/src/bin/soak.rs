@@ -1,7 +1,7 @@
-//! Repeats the random tests of the whole workspace with fresh seeds, and says what fails.
+//! Repeats the random tests of the whole workspace with fresh seeds, and reports failures.
 //!
-//! A random test is known by what it does: it asks the crate `seeded` for its generator. So the first
-//! round runs every test of the targets that name that crate, and the other rounds the tests that asked.
+//! A test is random if it gets its generator from the crate `seeded`. The first round runs every test of the
+//! targets whose sources name that crate; later rounds run only the tests that requested a generator.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -12,34 +12,34 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 use serde_json::Value;
 
-/// Repeats the random tests of the workspace with fresh seeds, and says what fails.
+/// Repeats the random tests of the workspace with fresh seeds, and reports failures.
 ///
-/// Each failure is shown with its output, which names the seed and the command that repeats it. Exit
-/// codes: 0 nothing failed; 1 something failed; 2 the tests could not be run.
+/// Each failure is printed with its output, which names the seed and the command that repeats the failure.
+/// Exit codes: 0 nothing failed; 1 something failed; 2 the tests could not be run.
 #[derive(Debug, Parser)]
 #[command(name = "cargo soak")]
 struct Arguments {
-    /// Minutes after which no more rounds begin
+    /// Start no more rounds after this many minutes
     #[arg(long, value_name = "N", default_value = "10")]
     minutes: f64,
-    /// Rounds after which to end
+    /// Stop after this many rounds
     #[arg(long, value_name = "N")]
     rounds: Option<u64>,
-    /// Most cases that a test tries, in place of its own number: more rounds, fewer cases in each
+    /// Most cases of a test, in place of its own number: more rounds, fewer cases in each
     #[arg(long, value_name = "N")]
     cases: Option<u64>,
-    /// Only the tests whose names contain this
+    /// Run only the tests whose names contain this
     #[arg(long, value_name = "TEXT", default_value = "")]
     only: String,
 }
 
-/// How often to say how far it is.
+/// Interval between progress reports.
 const REPORT: Duration = Duration::from_secs(30);
 
-/// Targets whose tests need QEMU: each takes seconds or more.
+/// Targets whose tests need QEMU: each runs for seconds or more.
 const NEED_QEMU: [&str; 1] = ["qemu"];
 
-/// What the source of a random test has in it.
+/// Text that the source of every random test contains.
 const CRATE: &str = "seeded::";
 
 /// A test binary, and its random tests.
@@ -52,7 +52,7 @@ struct Target {
     tests: BTreeMap<String, Count>,
 }
 
-/// Runs of a test, and those that failed.
+/// Runs of a test, and how many of them failed.
 #[derive(Clone, Copy, Default)]
 struct Count {
     runs: u64,
@@ -71,7 +71,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Returns whether nothing failed.
+/// Returns whether every test passed.
 fn soak(arguments: &Arguments) -> Result<bool, String> {
     let mut targets = targets()?;
     let start = Instant::now();
@@ -117,7 +117,7 @@ fn sum(targets: &[Target]) -> Count {
 }
 
 impl Target {
-    /// Runs the random tests once; in the first round all tests, to learn which are random.
+    /// Runs the random tests once. The first round runs all tests, to learn which are random.
     fn round(&mut self, arguments: &Arguments, first: bool) -> Result<(), String> {
         let log = std::env::temp_dir().join(format!("soak-{}.log", std::process::id()));
         let mut command = Command::new(&self.program);
@@ -143,7 +143,7 @@ impl Target {
         let text = String::from_utf8_lossy(&output.stdout);
         let mut asked: Vec<_> = asked.lines().collect();
         asked.sort_unstable();
-        // A test may ask more than once.
+        // A test may request several generators.
         asked.dedup();
         for test in asked {
             let failed = text.contains(&format!("test {test} ... FAILED"));
@@ -154,7 +154,7 @@ impl Target {
         if !output.status.success() {
             println!("{}: {}\n{text}", self.name, output.status);
             println!("{}", String::from_utf8_lossy(&output.stderr));
-            // One that ended without a word of it took the whole binary with it.
+            // No test is reported as failed, so a test ended the whole binary.
             if !text.contains("... FAILED") {
                 let abort = self.tests.entry("(the binary ended)".into()).or_default();
                 abort.failures += 1;
@@ -164,7 +164,7 @@ impl Target {
     }
 }
 
-/// Runs Cargo and returns what it prints.
+/// Runs Cargo and returns its output.
 fn cargo(arguments: &[String]) -> Result<String, String> {
     let cargo = std::env::var_os("CARGO").unwrap_or("cargo".into());
     let output = Command::new(cargo)
@@ -178,7 +178,7 @@ fn cargo(arguments: &[String]) -> Result<String, String> {
     }
 }
 
-/// Builds and returns the targets that may have random tests among them, and no others.
+/// Builds and returns only the targets that may contain random tests.
 fn targets() -> Result<Vec<Target>, String> {
     let words = |text: &str| text.split(' ').map(String::from).collect::<Vec<_>>();
     let metadata = cargo(&words("metadata --no-deps --format-version 1"))?;
@@ -241,8 +241,8 @@ fn targets() -> Result<Vec<Target>, String> {
     }
 }
 
-/// Whether a target's sources name the crate `seeded`: of a library all of its folder, of a test the
-/// file itself and its modules.
+/// Whether a target's sources name the crate `seeded`. For a library that is any file of its folder; for a
+/// test, the file and its modules.
 fn names_seeded(source: &Path) -> bool {
     let Some(folder) = source.parent() else {
         return false;

@@ -13,9 +13,9 @@ use oracle::shrink::{shrink, source};
 use oracle::small_world::{STEPS, TRIANGLES, triangle};
 use oracle::{plane, solid};
 
-/// Compares the renderer with the oracle on random cases that favour trouble: polygons by both scans,
-/// texels of the exact mapper, solids in any pose. Or all triangles of a small world. Exit code 0:
-/// equal; 1: not, with a test to paste; 2: wrong usage; 130: interrupted.
+/// Compares the renderer with the oracle on random cases that are likely to fail: polygons in both scans,
+/// texels of the exact mapper, solids in any pose. Or on all triangles of a small world. Exit code 0: equal;
+/// 1: different, with a test to paste; 2: wrong usage; 130: interrupted.
 #[derive(Parser)]
 #[command(name = "cargo sweep")]
 struct Arguments {
@@ -25,21 +25,20 @@ struct Arguments {
     /// Stop after this many minutes
     #[arg(long, conflicts_with = "seconds")]
     minutes: Option<u64>,
-    /// Stop after this many cases of each mix; of solids every 50th is tried
+    /// Stop after this many cases of each mix (solids: every 50th case only)
     #[arg(long)]
     cases: Option<u64>,
-    /// Make the same cases again [default: fresh ones]
+    /// Repeat the cases of this seed [default: a fresh seed]
     #[arg(long, conflicts_with = "small_world")]
     seed: Option<u64>,
-    /// Begin with this case, where a sweep of the same seed ended
+    /// Start with this case, where a sweep of the same seed ended
     #[arg(long, default_value_t = 0)]
     from: u64,
-    /// Only the mixes with this in their names, as in the table: "texels", "solids: cube"; may be
-    /// given again
+    /// Only the mixes whose names in the table contain this: "texels", "solids: cube"; repeatable
     #[arg(long, value_name = "TEXT", conflicts_with = "small_world")]
     only: Vec<String>,
-    /// Every triangle on a lattice of 16 x 16, all 16.7 million, with a step of 128/256 pixel
-    /// or as given
+    /// Every triangle on a lattice of 16 x 16, all 16.7 million; the lattice's step is 128/256 pixel or as
+    /// given
     #[arg(long, value_name = "STEP", num_args = 0..=1, default_missing_value = "128",
           value_parser = step)]
     small_world: Option<i32>,
@@ -50,19 +49,19 @@ fn step(text: &str) -> Result<i32, String> {
     step.ok_or_else(|| format!("the step is one of {STEPS:?}"))
 }
 
-/// Cases between two looks at the clock, of each mix: a fraction of a second.
+/// Cases of each mix between two checks of the clock: a fraction of a second.
 const ROUND: u64 = 1000;
 
-/// A solid takes as long as some hundred polygons: with only every 50th case tried, solids, texels
-/// and polygons get about a third of the time each.
+/// A solid needs as much time as some hundred polygons. With every 50th case only, solids, texels and
+/// polygons get about a third of the time each.
 const SOLIDS: u64 = 50;
 
-/// Without a terminal: how often it is told how far the sweep is.
+/// Interval between progress reports without a terminal.
 const SILENCE: Duration = Duration::from_secs(10);
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// What was done of a mix.
+/// Results of a mix.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     tried: u64,
@@ -71,7 +70,7 @@ struct Tally {
     failed: u64,
 }
 
-/// What solids came to, beside that.
+/// Further results of the solids.
 #[derive(Default)]
 struct Solids {
     /// Pixels seen from outside.
@@ -79,7 +78,7 @@ struct Solids {
     compared: solid::Compared,
 }
 
-/// What a sweep goes through side by side.
+/// A kind of case. A sweep alternates between all kinds.
 #[derive(Clone, Copy)]
 enum Kind {
     Polygons(Mix),
@@ -106,7 +105,7 @@ impl Kind {
         }
     }
 
-    /// Every how manieth number is a case.
+    /// Runs every Nth case only.
     fn stride(self) -> u64 {
         match self {
             Self::Solids(_) => SOLIDS,
@@ -114,7 +113,7 @@ impl Kind {
         }
     }
 
-    /// The case, of a kind that consists of polygons.
+    /// The case, if this kind consists of polygons.
     fn polygons(self, seed: u64, number: u64) -> Option<Case> {
         match self {
             Self::Polygons(mix) => Some(mix.case(seed, number)),
@@ -127,18 +126,18 @@ impl Kind {
     }
 }
 
-/// What checks the cases.
+/// The checkers of each kind of case.
 #[derive(Default)]
 struct Checkers {
     polygons: Checker,
     texels: plane::Checker,
     solids: solid::Checker,
-    /// What the solids came to so far.
+    /// The solids' further results so far.
     seen: Solids,
 }
 
 impl Checkers {
-    /// Tries a case; nothing comes back of one that failed.
+    /// Checks a case; returns `None` if it fails.
     fn try_case(&mut self, kind: Kind, seed: u64, number: u64) -> Option<Tally> {
         let tally = |polygons, pixels| Tally {
             polygons,
@@ -167,7 +166,7 @@ impl Checkers {
         }
     }
 
-    /// A test with a case that failed.
+    /// The source of a test with a failed case.
     fn source(&mut self, kind: Kind, seed: u64, number: u64, from: &str) -> String {
         const FAILS: &str = "a case fails again";
         match kind {
@@ -191,11 +190,11 @@ impl Checkers {
     }
 }
 
-/// What is swept, and how it is asked for.
+/// The kinds of a sweep, and how to repeat it.
 struct Plan {
     kinds: Vec<Kind>,
     seed: u64,
-    /// The options that make the same cases again.
+    /// The options that repeat the same cases.
     options: String,
     /// One more than the last case.
     last: u64,
@@ -237,7 +236,7 @@ impl Plan {
         })
     }
 
-    /// How a case is told, so that it can be tried again.
+    /// Names a case so that it can be repeated.
     fn told(&self, kind: Kind, number: u64) -> String {
         let name = kind.name();
         match kind {
@@ -256,7 +255,7 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    // A second Ctrl-C is not needed: a round takes a fraction of a second.
+    // No second Ctrl-C is needed: a round lasts a fraction of a second.
     if let Err(error) = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed)) {
         eprintln!("Ctrl-C will lose the figures: {error}");
     }
@@ -295,7 +294,7 @@ fn sweep(plan: &Plan, arguments: &Arguments) -> ExitCode {
                     continue;
                 }
                 tally.failed += 1;
-                // One of a mix is enough to look at.
+                // The first failure of a mix is enough.
                 if tally.failed == 1 {
                     let from = plan.told(kind, number);
                     failures.push(checkers.source(kind, plan.seed, number, &from));
@@ -357,7 +356,7 @@ fn print(kinds: &[Kind], tallies: &[Tally], took: Duration) {
 }
 
 impl Solids {
-    /// What is no failure, and still to be known.
+    /// Prints results that are not failures.
     fn print(&self) {
         let Self { outside, compared } = self;
         if *outside > 0 {
@@ -378,7 +377,7 @@ impl Solids {
     }
 }
 
-/// Tells on standard error how far it is: on a terminal by a moving line, elsewhere now and then.
+/// Reports progress on standard error: a moving line on a terminal, a line from time to time elsewhere.
 struct Progress {
     from: u64,
     limit: Option<Duration>,
