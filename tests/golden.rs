@@ -17,6 +17,7 @@ use link::{Command, Content, Picture};
 use qemu::{Config, Machine};
 use setup::Ready;
 use tempfile::TempDir;
+use texmap::{Mapper, Order};
 use vga::Access;
 
 use crate::ready::{READY, config};
@@ -137,6 +138,22 @@ fn goldens_sent_byte_by_byte_are_of_every_kind() {
     assert_eq!(of_order, [""; 0], "no golden with such an order is sent");
     let of_kind = covered(|a, b| kind_of_scene(a) == kind_of_scene(b));
     assert_eq!(of_kind, [""; 0], "no golden of such a scene is sent");
+}
+
+#[test]
+fn every_mapper_and_every_order_has_a_golden() {
+    let all = goldens();
+    for &(name, mapper, _) in Mapper::ALL {
+        let has = |golden: &Golden| golden.look.mapper.unwrap_or_default() == mapper;
+        assert!(all.iter().any(has), "no golden is drawn by {name}");
+    }
+    for (name, order, _) in Order::ALL {
+        let drawn = |golden: &Golden| golden.look.order.map_or(Order::default(), |set| set.0);
+        assert!(
+            all.iter().any(|golden| drawn(golden) == order),
+            "no golden is drawn in the order {name}"
+        );
+    }
 }
 
 /// A few goldens, for a quick check of a configuration.

@@ -380,7 +380,7 @@ impl Command {
             "fail" => {
                 let fault = Fault::ALL.iter().find(|(name, _)| argument == Some(name));
                 return fault.map(|&(_, fault)| Self::Fail(fault)).ok_or(takes(
-                    "panic, panic-in-line, page-fault, stack-overflow, triple-fault or hang",
+                    "panic, panic-in-line, page-fault, stack-overflow, triple-fault, adapter or hang",
                 ));
             }
             "hold" => Self::Hold,
