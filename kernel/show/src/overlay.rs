@@ -468,10 +468,13 @@ impl<'a> Overlay<'a> {
         }
         match lowered {
             Some(faces) if mapper.lower().is_some() => {
-                line(Ink::Plain, format_args!("faces in lower quality: {faces}"));
+                line(
+                    Ink::Plain,
+                    format_args!("faces in reduced quality: {faces}"),
+                );
             }
             // Without this line the key would seem to have no effect.
-            Some(_) => line(Ink::Plain, format_args!("no lower quality than {mapper}")),
+            Some(_) => line(Ink::Plain, format_args!("nothing cheaper than {mapper}")),
             None => {}
         }
         if *paused {
@@ -698,12 +701,12 @@ mod tests {
         };
         assert_eq!(
             last(lowered(Mapper::Exact, 3)),
-            [plain("faces in lower quality: 3")]
+            [plain("faces in reduced quality: 3")]
         );
         let affine = Mapper::default();
         assert_eq!(
             last(lowered(affine, 0)),
-            [plain("no lower quality than shifts")]
+            [plain("nothing cheaper than shifts")]
         );
         let within = Mapper::parse("within-1/4").unwrap();
         let paused = Figures {
@@ -714,7 +717,7 @@ mod tests {
             last(paused),
             [
                 plain("at most 1/4 texel off"),
-                plain("faces in lower quality: 0"),
+                plain("faces in reduced quality: 0"),
                 bright("paused")
             ]
         );

@@ -210,7 +210,7 @@ fn keys_are_listed_with_what_they_do() {
     let keys = done(&mut show, "keys", 0);
     assert_eq!(keys.len(), KEYS.len());
     assert!(
-        keys.contains(&"Space pause: pause, and go on".to_string()),
+        keys.contains(&"Space pause: pause and resume".to_string()),
         "{keys:?}"
     );
     show.key(M, 0);

@@ -68,27 +68,27 @@ impl Mapper {
         (
             "row-multiply",
             Self::Rows(Rows::Multiply),
-            "rows, half steps; plane, address and texel anew for every pixel (chapter 57's first)",
+            "rows, half steps; plane, address and texel computed for every pixel (chapter 57's first)",
         ),
         (
             "row-steps",
             Self::Rows(Rows::Steps),
-            "rows, half steps; all of it stepped, Map Mask rotated (chapter 57's second)",
+            "rows, half steps; everything stepped, Map Mask rotated (chapter 57's second)",
         ),
         (
             "row-passes",
             Self::Rows(Rows::Passes),
-            "rows, half steps; four passes, one a plane (what chapter 58 turned down)",
+            "rows, half steps; four passes, one a plane (rejected by chapter 58)",
         ),
         (
             "half-step",
             Self::HalfStep,
-            "columns by chapter 57's half steps",
+            "columns with chapter 57's half steps",
         ),
         (
             "affine",
             Self::Affine(Loop::Multiply),
-            "columns; the texel's index multiplied out: the clear twin of the next seven",
+            "columns; the texel's index by multiplication: the reference of the next seven loops",
         ),
         (
             "two-carries",
@@ -173,7 +173,7 @@ impl Mapper {
         (
             "nearer",
             Self::Nearer,
-            "perspective; as linear-16, in columns or rows by which changes its depth less",
+            "perspective; linear-16 along columns or rows, whichever changes the depth less",
         ),
         (
             "tiles-16",
@@ -183,42 +183,42 @@ impl Mapper {
         (
             "free",
             Self::Free,
-            "perspective; one division a line of constant depth, which goes any way",
+            "perspective; one division for each line of constant depth, in any direction",
         ),
         (
             "level",
             Self::Level,
-            "perspective; one division a column of a wall or row of a floor, otherwise exact",
+            "perspective; one division for each column of a wall or row of a floor, otherwise exact",
         ),
         (
             "within-1",
             Self::Within(Tolerance::part(0)),
-            "perspective; for each face and run the cheapest way within a texel",
+            "perspective; for each face and span the cheapest way within a texel",
         ),
         (
             "within-1/2",
             Self::Within(Tolerance::part(1)),
-            "perspective; for each face and run the cheapest way within 1/2 texel",
+            "perspective; for each face and span the cheapest way within 1/2 texel",
         ),
         (
             "within-1/4",
             Self::Within(Tolerance::part(2)),
-            "perspective; for each face and run the cheapest way within 1/4 texel",
+            "perspective; for each face and span the cheapest way within 1/4 texel",
         ),
         (
             "within-1/16",
             Self::Within(Tolerance::part(4)),
-            "perspective; for each face and run the cheapest way within 1/16 texel",
+            "perspective; for each face and span the cheapest way within 1/16 texel",
         ),
         (
             "within-1/256",
             Self::Within(Tolerance::part(8)),
-            "perspective; for each face and run the cheapest way within 1/256 texel",
+            "perspective; for each face and span the cheapest way within 1/256 texel",
         ),
         (
             "exact",
             Self::Exact,
-            "perspective; a quotient for every pixel, rounded nowhere",
+            "perspective; a quotient for every pixel, without rounding",
         ),
     ];
 

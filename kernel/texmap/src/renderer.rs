@@ -44,17 +44,17 @@ impl Order {
         (
             "polygons",
             Self::Polygons,
-            "as the polygons come, Map Mask once for each column",
+            "polygon by polygon, Map Mask once for each column",
         ),
         (
             "planes",
             Self::Planes,
-            "plane by plane, Map Mask four times for a picture",
+            "plane by plane, Map Mask four times for a frame",
         ),
         (
             "buffer",
             Self::Buffer,
-            "plane by plane into RAM, then stored eight bytes at once",
+            "plane by plane into RAM, then to the card eight bytes at once",
         ),
     ];
 

@@ -35,7 +35,7 @@ static SOLID: Solid = build();
 /// The ball.
 pub const BALL: Entry<'static> = Entry {
     name: "ball",
-    about: "the globe of flat facets: many small polygons, short runs",
+    about: "the globe of flat facets: many small polygons, short spans",
     mesh: MESH,
     colours: Colours::BUILT_IN,
     background: &BACKGROUND,

@@ -42,7 +42,7 @@ static SOLID: Solid = build();
 /// A walk between two walls.
 pub const CORRIDOR: Entry<'static> = Entry {
     name: "corridor",
-    about: "a walk between two walls: tiled textures, a mipmap for each distance",
+    about: "a walk between two walls: tiled textures, a mipmap for each face",
     mesh: MESH,
     colours: Colours::BUILT_IN,
     background: &LEVEL_BACKGROUND,

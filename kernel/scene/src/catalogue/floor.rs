@@ -10,7 +10,7 @@ use crate::{MAX_EXTENT, Mesh, Pose, Vec3};
 /// A floor whose far edge is 16 times as far away as its near edge.
 pub const GRAZING_16: Entry<'static> = Entry {
     name: "grazing-16",
-    about: "a floor to the horizon, sixteen times as far away there as at its near edge",
+    about: "a floor to the horizon: its far edge is 16 times as far away as its near edge",
     mesh: FLOOR_16,
     colours: Colours::BUILT_IN,
     background: &LEVEL_BACKGROUND,
@@ -28,7 +28,7 @@ pub const GRAZING_16: Entry<'static> = Entry {
 /// A floor whose far edge is 4096 times as far away as its near edge.
 pub const GRAZING_4096: Entry<'static> = Entry {
     name: "grazing-4096",
-    about: "a floor from under the eye to the horizon: 4096 times as far away there",
+    about: "a floor to the horizon: its far edge is 4096 times as far away as its near edge",
     mesh: FLOOR_4096,
     colours: Colours::BUILT_IN,
     background: &LEVEL_BACKGROUND,

@@ -42,7 +42,7 @@ static SOLID: Solid = build();
 /// The knot.
 pub const KNOT: Entry<'static> = Entry {
     name: "knot",
-    about: "a tube tied in a trefoil: parts of it hide others",
+    about: "a tube tied in a trefoil knot: parts of it hide others",
     mesh: MESH,
     colours: Colours::BUILT_IN,
     background: &BACKGROUND,

@@ -10,7 +10,7 @@ use crate::{Mesh, Pose, Vec3};
 /// The square at one depth, turning.
 pub const FACING: Entry<'static> = Entry {
     name: "facing",
-    about: "a square that faces the viewer and turns: no perspective at all",
+    about: "a square that faces the viewer and turns: no perspective",
     mesh: SQUARE,
     colours: Colours::BUILT_IN,
     background: &BACKGROUND,
