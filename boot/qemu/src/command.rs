@@ -15,6 +15,7 @@ use link::Exit;
 use rustix::process::Pid;
 
 use super::Config;
+use super::option::names_accelerator;
 use super::run::Event;
 use system::child;
 
@@ -28,9 +29,6 @@ const SERIAL: i32 = 4;
 /// inherits would also reach the children of other threads, and this program would then not notice that QEMU
 /// has closed its end.
 const MOVE_SOCKETS: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >&2"#;
-
-/// Options that choose an accelerator, besides `-machine accel=`.
-const ACCELERATOR_OPTIONS: [&str; 4] = ["accel", "enable-kvm", "enable-hax", "enable-hvf"];
 
 /// Returns QEMU's arguments.
 pub fn arguments(config: &Config) -> Vec<OsString> {
@@ -65,27 +63,6 @@ pub fn arguments(config: &Config) -> Vec<OsString> {
 /// Escapes a path for the value of a QEMU option: QEMU reads two commas as one.
 fn escaped(path: &Path) -> String {
     path.to_string_lossy().replace(',', ",,")
-}
-
-/// Returns the name of an option without its dashes. QEMU accepts one dash or two.
-pub fn option(word: &str) -> Option<&str> {
-    word.strip_prefix("--").or_else(|| word.strip_prefix('-'))
-}
-
-/// Returns whether the arguments choose an accelerator, in any of QEMU's spellings.
-pub fn names_accelerator(arguments: &[OsString]) -> bool {
-    let words: Vec<_> = arguments
-        .iter()
-        .map(|word| word.to_string_lossy())
-        .collect();
-    words.iter().enumerate().any(|(at, word)| {
-        let value = words.get(at + 1).map_or("", |value| value.as_ref());
-        match option(word) {
-            Some("machine" | "M") => value.split(',').any(|part| part.starts_with("accel=")),
-            Some(name) => ACCELERATOR_OPTIONS.contains(&name),
-            None => false,
-        }
-    })
 }
 
 /// A started QEMU: its process, and the host's ends of its sockets.

@@ -15,6 +15,7 @@
 //! and feed one channel. The caller's thread makes every decision.
 
 mod command;
+mod option;
 mod qmp;
 mod run;
 mod verdict;
@@ -174,7 +175,7 @@ impl Machine {
         tap: impl FnOnce(UnixStream) -> UnixStream,
     ) -> anyhow::Result<Self> {
         let daemonize =
-            |word: &OsString| word.to_str().and_then(command::option) == Some("daemonize");
+            |word: &OsString| word.to_str().and_then(option::option) == Some("daemonize");
         if config.arguments.iter().any(daemonize) {
             bail!(
                 "-daemonize: QEMU must stay this program's child, or nothing could end it; leave it out"

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::SystemTime;
 
-use super::command::{names_accelerator, option};
+use super::option::{names_accelerator, option};
 use frames::screen::Screen;
 
 /// MiB of memory with which the image boots on every QEMU version tried: 7.2 needs 25, versions from 10 on up
