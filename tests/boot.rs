@@ -139,6 +139,20 @@ fn the_running_show_paces_itself_and_can_be_held() {
     machine.leave().unwrap();
 }
 
+/// Presses keys until the log has a change that ends in `change`, and returns the log. QEMU passes keys on with
+/// a delay, and drops those that do not fit its buffer.
+fn logged(machine: &mut Machine, change: &str, press: impl Fn(&mut Machine)) -> Vec<String> {
+    for _ in 0..600 {
+        press(machine);
+        machine.rest(Duration::from_millis(50)).unwrap();
+        let log = machine.ask(Command::Log).unwrap();
+        if log.iter().any(|line| line.ends_with(change)) {
+            return log;
+        }
+    }
+    panic!("600 presses, and no change in the log ends in '{change}'");
+}
+
 /// Steers with keys and with commands. The log must then reproduce the frame on the screen, held, and on the
 /// emulated VGA too.
 #[test]
@@ -154,24 +168,20 @@ fn a_steered_show_is_brought_back_by_its_log() {
         machine.key(key, true).unwrap();
         machine.key(key, false).unwrap();
     }
-    // QEMU passes keys on with a delay, and drops those that do not fit its buffer. The scene must not change
-    // between two of them.
-    let mut log = Vec::new();
-    while !log.iter().any(|line: &String| line.ends_with(" nearer")) {
+    // The scene must not change between two of these keys.
+    logged(&mut machine, " nearer", |machine| {
         machine.key("pgup", true).unwrap();
         machine.key("pgup", false).unwrap();
-        machine.rest(Duration::from_millis(50)).unwrap();
-        log = machine.ask(Command::Log).unwrap();
-    }
+    });
     let steer = |name| Command::Steer(None, Change::Act(Action::parse(name).unwrap()));
     for name in ["next-scene", "pitch-up", "coarser"] {
         machine.ask(steer(name)).unwrap();
         machine.rest(Duration::from_millis(100)).unwrap();
     }
-    machine.key("spc", true).unwrap();
-    while !log.iter().any(|line: &String| line.ends_with(" pause")) {
-        log = machine.ask(Command::Log).unwrap();
-    }
+    // Without a release a second press is a repeat, which does not end the pause.
+    let log = logged(&mut machine, " pause", |machine| {
+        machine.key("spc", true).unwrap();
+    });
     println!("{log:#?}");
     let pushed = |name| log.iter().filter(|line| line.ends_with(name)).count();
     assert_eq!((pushed(" next-mapper"), pushed(" next-scene")), (1, 1));
