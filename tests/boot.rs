@@ -14,8 +14,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use frames::card::{self, Card, Emulated};
-use link::{Action, Change, Command, Content, Fault, Picture};
 use modex::registers::MODE_X;
+use protocol::{Action, Change, Command, Content, Fault, Picture};
 use qemu::{Config, Limits, Machine, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 

@@ -8,8 +8,8 @@ use std::process::{Command, Output, Stdio};
 use frames::dump::Dump;
 use frames::indexed::Indexed;
 use frames::screen::Screen;
-use link::dump::{Header, PLANE_BYTES};
-use link::{Content, Picture, Word};
+use protocol::dump::{Header, PLANE_BYTES};
+use protocol::{Content, Picture, Word};
 use tempfile::TempDir;
 
 /// A folder of files to compare; the program runs in it.
@@ -257,7 +257,7 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
     let lines: Vec<_> = good.split_inclusive('\n').collect();
     let framed = |text: &str| {
         let mut line = Vec::new();
-        link::write_line(format_args!("{text}"), |bytes| {
+        protocol::write_line(format_args!("{text}"), |bytes| {
             line.extend_from_slice(bytes);
         });
         String::from_utf8(line).unwrap()
@@ -266,7 +266,7 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
     let mut huge = picture.clone();
     // The header's size and its checksum.
     huge[16..24].copy_from_slice(&[0x7F, 0xFF, 0xFF, 0xFF, 0x7F, 0xFF, 0xFF, 0xFF]);
-    let mut checksum = link::Checksum::new();
+    let mut checksum = protocol::Checksum::new();
     checksum.add(&huge[12..29]);
     huge[29..33].copy_from_slice(&checksum.value().to_be_bytes());
     let mut rgb = Vec::new();

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crystal_ball::golden_folder;
 use frames::card::{self, Card, Emulated};
 use frames::golden::{self, Findings, Golden, Transfer};
-use link::{Command, Content, Picture};
+use protocol::{Command, Content, Picture};
 use qemu::{Config, Machine};
 use setup::Options;
 

@@ -16,8 +16,8 @@ use fastrand::Rng;
 use frames::indexed::Indexed;
 use import::{Model, obj, solid, texture};
 use in_place::InPlace;
+use model::{Arena, MAX_BYTES, Pack, Parts};
 use modex::PlanarBuffer;
-use pack::{Arena, MAX_BYTES, Pack, Parts};
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use scene::{MAX_EXTENT, Mesh, Pose, Stage, Storage};
 use texmap::{Mapper, Texture};
@@ -215,7 +215,7 @@ fn pack_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
         bytes[..12].copy_from_slice(&before[..12]);
         let length = (bytes.len() as u32).to_le_bytes();
         bytes[12..16].copy_from_slice(&length);
-        let mut checksum = link::Checksum::new();
+        let mut checksum = protocol::Checksum::new();
         checksum.add(&bytes[COUNTS..]);
         bytes[16..20].copy_from_slice(&checksum.value().to_le_bytes());
     }
@@ -420,7 +420,7 @@ fn chunks_case(good: &[Vec<u8>], random: &mut Rng) -> bool {
     let mut bytes = good[0][..8].to_vec();
     for (kind, data) in chunks {
         bytes.extend((data.len() as u32).to_be_bytes());
-        let mut checksum = link::Checksum::new();
+        let mut checksum = protocol::Checksum::new();
         for part in [&kind, &data] {
             checksum.add(part);
             bytes.extend_from_slice(part);

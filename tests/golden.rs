@@ -13,7 +13,7 @@ use crystal_ball::golden_folder;
 use frames::card::{self, Card, Emulated};
 use frames::difference::Subject;
 use frames::golden::{self, Findings, Golden, Transfer};
-use link::{Command, Content, Picture};
+use protocol::{Command, Content, Picture};
 use qemu::{Config, Machine};
 use setup::Ready;
 use tempfile::TempDir;

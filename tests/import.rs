@@ -49,7 +49,7 @@ fn run(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
 fn png_of(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
     let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
     for (kind, data) in chunks {
-        let mut checksum = link::Checksum::new();
+        let mut checksum = protocol::Checksum::new();
         checksum.add(*kind);
         checksum.add(data);
         bytes.extend((data.len() as u32).to_be_bytes());

@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use frames::card::{self, Card, Emulated};
 use frames::dump::Dump;
-use link::{Command, Content, Picture};
+use protocol::{Command, Content, Picture};
 use qemu::{Config, Limits, Machine, Verdict};
 
 use crate::judged::{Judged, verdict};
@@ -414,7 +414,7 @@ fn a_flood_of_the_kernels_ends_in_a_hang() {
             // Keeps the line open; the kernel receives nothing.
             let _kernel = kernel;
             let mut line = Vec::new();
-            link::write_line(format_args!("flood"), |bytes| line.extend_from_slice(bytes));
+            protocol::write_line(format_args!("flood"), |bytes| line.extend_from_slice(bytes));
             wait.recv().unwrap();
             while flood.write_all(&line).is_ok() {}
         });

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::sync::LazyLock;
 
-use cost::Work;
+use bench::Work;
 use study::measure::{self, Config, Cpu, Emulated, Measured, Memories};
 use texmap::{Mapper, Order};
 
@@ -71,13 +71,13 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
             a_pixel(Work::ScreenRam) <= a_pixel(Work::ScreenCard),
             "{name}"
         );
-        assert_eq!(row.runs.len(), cost::LENGTHS.len());
+        assert_eq!(row.runs.len(), bench::LENGTHS.len());
         for run in &row.runs {
             let length = run.length;
             assert_eq!(run.draw.pixels % u64::from(length), 0, "{name}: {length}");
             assert_eq!(run.draw.pixels, run.jobs.pixels, "{name}: {length}");
         }
-        let (shortest, longest) = (&row.runs[0].draw, &row.runs[cost::LENGTHS.len() - 1].draw);
+        let (shortest, longest) = (&row.runs[0].draw, &row.runs[bench::LENGTHS.len() - 1].draw);
         assert!(
             shortest.instructions_a_pixel() > longest.instructions_a_pixel(),
             "{name}: a run of one pixel pays all of its set-up"

@@ -5,7 +5,7 @@ use std::fs;
 use frames::card::{self, Card, Emulated};
 use frames::screen::Screen;
 use import::Model;
-use link::{Command, Content, Picture, Setting, Word};
+use protocol::{Command, Content, Picture, Setting, Word};
 use qemu::{Config, Machine};
 use setup::Options;
 use tempfile::TempDir;

@@ -28,7 +28,7 @@ fn scene(golden: &Golden) -> &'static Entry<'static> {
 /// The pose of a golden's last frame.
 fn pose(golden: &Golden) -> Pose {
     let picture = golden.show.last().expect("a golden shows something");
-    show::pose(scene(golden), *picture).expect("a golden's pose is legal")
+    demo::pose(scene(golden), *picture).expect("a golden's pose is legal")
 }
 
 /// What the definitions allow at each pixel: the colours, and the number of polygons that cover it. Polygons

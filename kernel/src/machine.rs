@@ -14,8 +14,8 @@ use core::ptr::NonNull;
 
 use bootloader_api::config::Mapping;
 use bootloader_api::{BootInfo, BootloaderConfig};
-use link::{Exit, HELLO, PROTOCOL};
 use modex::SetError;
+use protocol::{Exit, HELLO, PROTOCOL};
 
 pub use vga::Window;
 
@@ -46,7 +46,7 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     serial::cancel_line();
     serial::line(format_args!(
         "{HELLO} crystal-ball {} protocol {PROTOCOL}",
-        show::VERSION
+        demo::VERSION
     ));
     cpu::init(boot_info.kernel_stack_bottom);
     keyboard::init();
@@ -101,21 +101,21 @@ pub fn stop() -> ! {
 }
 
 /// Fails in the requested way.
-pub fn fail(fault: link::Fault) -> ! {
+pub fn fail(fault: protocol::Fault) -> ! {
     match fault {
-        link::Fault::Panic => panic!("asked to, by 'fail panic'"),
-        link::Fault::PanicInLine => panic_in_line(),
-        link::Fault::PageFault => cpu::page_fault(),
-        link::Fault::StackOverflow => cpu::stack_overflow(),
-        link::Fault::TripleFault => cpu::triple_fault(),
+        protocol::Fault::Panic => panic!("asked to, by 'fail panic'"),
+        protocol::Fault::PanicInLine => panic_in_line(),
+        protocol::Fault::PageFault => cpu::page_fault(),
+        protocol::Fault::StackOverflow => cpu::stack_overflow(),
+        protocol::Fault::TripleFault => cpu::triple_fault(),
         // The error that setting the mode returns if RAM is in place of the window.
-        link::Fault::Adapter => report::adapter(SetError::Plane {
+        protocol::Fault::Adapter => report::adapter(SetError::Plane {
             plane: 0,
             at: 0,
             expected: 0x51,
             actual: 0x54,
         }),
-        link::Fault::Hang => stop(),
+        protocol::Fault::Hang => stop(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The kernel: Crystal Ball on the bare machine.
 //!
 //! The kernel contains only the access to the hardware: ports, video memory, interrupts and the serial line.
-//! All of that is in [`machine`], with all of this crate's `unsafe` code. The crate [`show`] draws frames and
+//! All of that is in [`machine`], with all of this crate's `unsafe` code. The crate [`demo`] draws frames and
 //! answers commands, and runs on the host as well. A panic, a CPU exception or an unfit display adapter is
 //! reported as text on the serial line and ends QEMU with a code for its kind. The kernel never restarts on
 //! its own.
@@ -12,9 +12,9 @@
 
 use bootloader_api::{BootInfo, BootloaderConfig};
 use crystal_ball_kernel::machine::{self, clock, keyboard, serial, timer};
-use link::{LOADED, REFUSED};
-use pack::Pack;
-use show::{Memory, Request, Show};
+use demo::{Memory, Request, Show};
+use model::Pack;
+use protocol::{LOADED, REFUSED};
 use spin::Mutex;
 
 /// The fixed memory of the program.
@@ -29,7 +29,7 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     let pack = machine.ramdisk.and_then(taken);
     let mut show = Show::new(&mut memory, machine.vga, pack.as_ref())
         .unwrap_or_else(|error| machine::report::adapter(error));
-    let out: &mut show::Out<'_> = &mut |line| serial::line(line);
+    let out: &mut demo::Out<'_> = &mut |line| serial::line(line);
     let stopwatch = clock::Stopwatch::start(timer::ticks());
     loop {
         while let Some(received) = serial::receive() {
@@ -39,7 +39,7 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
             show.set_reception(serial::reception());
             match show.receive(received.byte, timer::ticks(), out) {
                 Some(Request::Fail(fault)) => machine::fail(fault),
-                Some(Request::Leave) => machine::exit(link::Exit::Left),
+                Some(Request::Leave) => machine::exit(protocol::Exit::Left),
                 None => {}
             }
         }

@@ -1,12 +1,12 @@
 //! The bench kernel: measures what drawing costs on the bare machine.
 //!
 //! It is a separate program beside the demo, built from the same crates and put into a separate image. The
-//! crate [`cost`] does the work and names what can be requested. This file adds the machine's card, its time
+//! crate [`bench`] does the work and names what can be requested. This file adds the machine's card, its time
 //! stamp counter and its serial line. Interrupts are off from a request to the end of its answer.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
+use bench::{Bench, Clock, Memory};
 use bootloader_api::{BootInfo, BootloaderConfig};
-use cost::{Bench, Clock, Memory};
 use crystal_ball_kernel::machine::{self, clock, serial};
 use spin::Mutex;
 
@@ -26,14 +26,14 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
         instructions: clock::instructions,
         bmi2: clock::has_bmi2(),
     };
-    let out: &mut cost::Out<'_> = &mut |line| serial::line(line);
+    let out: &mut bench::Out<'_> = &mut |line| serial::line(line);
     loop {
         while let Some(received) = serial::receive() {
             if received.damaged {
                 bench.damage();
             }
             if machine::undisturbed(|| bench.receive(received.byte, &clock, out)) {
-                machine::exit(link::Exit::Left);
+                machine::exit(protocol::Exit::Left);
             }
         }
         machine::sleep_while(|| !serial::has_received());

@@ -171,7 +171,7 @@ impl<const SIZE: usize> Default for Receiver<SIZE> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use link::Lines;
+    use protocol::Lines;
     use std::collections::VecDeque;
 
     /// A UART with a FIFO of 16 bytes, as its datasheet describes it.

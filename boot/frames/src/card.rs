@@ -7,12 +7,12 @@
 //! its geometry comes from its registers.
 
 use anyhow::{Context, anyhow, bail};
+use demo::{Memory, Show};
 use in_place::InPlace;
-use link::dump::{Header, PLANE_BYTES};
-use link::{Command, Content, ERROR, Motion, OK, Picture, Word};
-use pack::Pack;
+use model::Pack;
+use protocol::dump::{Header, PLANE_BYTES};
+use protocol::{Command, Content, ERROR, Motion, OK, Picture, Word};
 use scene::catalogue::Entry;
-use show::{Memory, Show};
 use vga::Vga;
 
 use crate::dump::Dump;

@@ -11,9 +11,9 @@ use std::io::{Cursor, Read};
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use link::Content;
-use link::dump::{MAGIC, OrNone, PLANE_BYTES};
 use modex::Rgb6;
+use protocol::Content;
+use protocol::dump::{MAGIC, OrNone, PLANE_BYTES};
 
 use crate::dump::Dump;
 use crate::indexed::Indexed;
@@ -547,8 +547,8 @@ impl fmt::Display for Field {
 
 #[cfg(test)]
 mod tests {
-    use link::dump::Header;
-    use link::{Picture, Word};
+    use protocol::dump::Header;
+    use protocol::{Picture, Word};
 
     use super::*;
 

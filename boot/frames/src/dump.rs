@@ -1,15 +1,15 @@
 //! Reads dumps on the host, checks each line, and writes them again.
 //!
-//! [`link::dump`] defines the format. The reader trusts nothing: each line must have a correct checksum and
+//! [`protocol::dump`] defines the format. The reader trusts nothing: each line must have a correct checksum and
 //! the expected label, and the last line's count and checksum must match the lines before it. So a missing,
 //! repeated or misplaced line is reported by its number.
 
 use std::fmt;
 use std::io::{self, Write};
 
-use link::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
-use link::{Content, Lines, Motion, Picture, Word};
 use modex::Palette;
+use protocol::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
+use protocol::{Content, Lines, Motion, Picture, Word};
 
 use crate::indexed::Indexed;
 use system::quote::quoted;
@@ -59,13 +59,12 @@ impl Dump {
             let Some(line) = lines.push(byte) else {
                 continue;
             };
-            let text =
-                line.map_err(|noise| noise.to_string()).and_then(|line| {
-                    match link::unframe(line) {
-                        Ok(text) => Ok(text.to_string()),
-                        Err(error) => Err(error.to_string()),
-                    }
-                });
+            let text = line.map_err(|noise| noise.to_string()).and_then(|line| {
+                match protocol::unframe(line) {
+                    Ok(text) => Ok(text.to_string()),
+                    Err(error) => Err(error.to_string()),
+                }
+            });
             // For a file of an entirely different kind, the error says that it is not a dump, not what its
             // bytes are.
             let first = texts.is_empty();
@@ -117,7 +116,7 @@ impl Dump {
         let mut outcome = Ok(());
         self.write_lines(|line| {
             let mut framed = Vec::new();
-            link::write_line(line, |bytes| framed.extend_from_slice(bytes));
+            protocol::write_line(line, |bytes| framed.extend_from_slice(bytes));
             if outcome.is_ok() {
                 outcome = to.write_all(&framed);
             }
@@ -128,7 +127,7 @@ impl Dump {
     /// Returns the checksums of the dump, as the kernel sends them.
     pub fn checksums(&self) -> Vec<String> {
         let mut lines = Vec::new();
-        link::dump::write_checksums(
+        protocol::dump::write_checksums(
             &self.header,
             &self.palette,
             |at, row| self.load(at, row),
@@ -151,7 +150,7 @@ impl Dump {
     }
 
     fn write_lines(&self, line: impl FnMut(fmt::Arguments<'_>)) {
-        link::dump::write(
+        protocol::dump::write(
             &self.header,
             &self.palette,
             |at, row| self.load(at, row),

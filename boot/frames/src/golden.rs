@@ -35,7 +35,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use link::{Command, Content, Picture};
+use protocol::{Command, Content, Picture};
 use scene::catalogue::Entry;
 use serde::Deserialize;
 use texmap::{Mapper, Order};

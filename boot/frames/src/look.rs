@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use link::{Command, Setting, Word};
+use protocol::{Command, Setting, Word};
 use scene::catalogue::{CATALOGUE, Entry};
 use texmap::{Mapper, Order};
 

@@ -14,7 +14,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
-use link::{Command, Content, Picture, TICKS_PER_SECOND};
+use protocol::{Command, Content, Picture, TICKS_PER_SECOND};
 
 use crate::card::{Card, Emulated};
 use crate::indexed::Indexed;

@@ -14,8 +14,8 @@ use std::os::unix::ffi::OsStrExt;
 use std::path::Path;
 
 use anyhow::Context;
-use link::Content;
 use modex::Rgb6;
+use protocol::Content;
 
 use crate::difference::{Bounds, Colour, Difference, Shape, Subject, colour, differing_entries};
 use crate::dump::Dump;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{ArgAction, Args};
-use link::{Command, Content, Motion, Picture};
+use protocol::{Command, Content, Motion, Picture};
 
 use crate::card::Card;
 use crate::look::Look;
@@ -182,7 +182,7 @@ fn stem(picture: Picture, motion: Option<Motion>, content: Content) -> String {
 
 #[cfg(test)]
 mod tests {
-    use link::dump::Header;
+    use protocol::dump::Header;
     use texmap::Mapper;
 
     use super::*;

@@ -13,6 +13,7 @@
 
 use std::collections::BTreeSet;
 
+use demo::HEAT;
 use image::Rgb;
 use modex::{Palette, Rgb6};
 use quantette::color_space::srgb8_to_oklab;
@@ -20,7 +21,6 @@ use quantette::deps::palette::{Oklab, Srgb};
 use quantette::{Pipeline, QuantizeMethod};
 use scene::catalogue::Colours;
 use scene::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable};
-use show::HEAT;
 use vga::widen;
 
 /// The number of variants of a material: one for each texel of a square of two by two.

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! All work is done here, once, in floating point where that is easier. The result consists of integers
-//! ([`pack`] has the format), and the same files give the same result.
+//! ([`model`] has the format), and the same files give the same result.
 
 pub mod colour;
 mod guard;
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use pack::{Pack, Parts};
+use model::{Pack, Parts};
 use scene::Mesh;
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use system::quote;

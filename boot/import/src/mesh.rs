@@ -11,7 +11,7 @@
 use anyhow::ensure;
 use earcut::Earcut;
 use earcut::utils3d::project3d_to_2d;
-use pack::MAX_ALL_CORNERS;
+use model::MAX_ALL_CORNERS;
 use scene::{Corner, Face, MAX_CORNERS, MAX_FACES, Pose, Vec3};
 
 use crate::layout::Layout;

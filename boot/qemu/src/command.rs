@@ -11,7 +11,7 @@ use std::sync::mpsc::{self, Sender};
 use std::thread;
 
 use anyhow::Context;
-use link::Exit;
+use protocol::Exit;
 use rustix::process::Pid;
 
 use super::Config;

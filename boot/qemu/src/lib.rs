@@ -32,7 +32,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, anyhow, bail};
-use link::{Command, Content, ERROR, LOADED, Lines, OK, RUNNING};
+use protocol::{Command, Content, ERROR, LOADED, Lines, OK, RUNNING};
 use rustix::fs::MemfdFlags;
 use rustix::process::{Pid, Signal, kill_process_group};
 use serde_json::{Value, json};
@@ -338,7 +338,7 @@ impl Machine {
     /// As [`Machine::send_raw`].
     pub fn send_line(&mut self, text: &str) -> anyhow::Result<()> {
         let mut framed = Vec::new();
-        link::write_line(format_args!("{text}"), |bytes| {
+        protocol::write_line(format_args!("{text}"), |bytes| {
             framed.extend_from_slice(bytes)
         });
         self.send_raw(&framed)
@@ -555,7 +555,7 @@ impl Machine {
             Some(Act::Acknowledge) => {
                 self.keep_screen();
                 // The kernel waits for this byte before it ends QEMU.
-                let _ = self.serial.write_all(&[link::ACKNOWLEDGE]);
+                let _ = self.serial.write_all(&[protocol::ACKNOWLEDGE]);
             }
             None => {}
         }
@@ -773,7 +773,7 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event
                     continue;
                 };
                 let text = line.map_err(|noise| noise.to_string()).and_then(|line| {
-                    link::unframe(line).map_err(|error| format!("{error}: {}", quoted(line)))
+                    protocol::unframe(line).map_err(|error| format!("{error}: {}", quoted(line)))
                 });
                 greeted |= text.is_ok();
                 let event = match text {

@@ -7,7 +7,7 @@ use std::collections::VecDeque;
 use std::process::ExitStatus;
 use std::time::Instant;
 
-use link::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, HELLO, LOADED, PANIC, REFUSED};
+use protocol::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, HELLO, LOADED, PANIC, REFUSED};
 use serde_json::Value;
 
 use super::verdict::{Found, Verdict};
@@ -108,7 +108,7 @@ impl Run {
     fn take_line(&mut self, line: String) -> Option<Act> {
         let word = line.split(' ').next().unwrap_or("");
         if word == HELLO {
-            let spoken = format!("protocol {}", link::PROTOCOL);
+            let spoken = format!("protocol {}", protocol::PROTOCOL);
             if self.hello {
                 self.decide(Verdict::TripleFault { booted: true });
             } else if !line.ends_with(&spoken) {
@@ -285,7 +285,7 @@ mod tests {
             let (from, rest) = event.split_once(' ').unwrap();
             let event = match from {
                 "qmp" => Event::Control(serde_json::from_str(rest).unwrap()),
-                "com1" if *event == HELLO => Event::Line(format!("{rest}{}", link::PROTOCOL)),
+                "com1" if *event == HELLO => Event::Line(format!("{rest}{}", protocol::PROTOCOL)),
                 "com1" => Event::Line(rest.into()),
                 "words" => Event::Words(rest.into()),
                 "end" => {

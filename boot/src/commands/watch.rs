@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crystal_ball::window;
 use frames::card::Card;
 use frames::look::Look;
-use link::{Action, Change, Command};
+use protocol::{Action, Change, Command};
 use qemu::{Config, Machine};
 use system::{say, write_atomically};
 

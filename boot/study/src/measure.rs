@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use anyhow::{Context, bail, ensure};
-use cost::{Ask, Figure, LENGTHS, MAX_ROUNDS, Work};
-use link::OK;
+use bench::{Ask, Figure, LENGTHS, MAX_ROUNDS, Work};
+use protocol::OK;
 use texmap::{Mapper, Order};
 
 use qemu::Machine;

@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::builder::PossibleValuesParser;
-use pack::{Arena, Pack};
+use model::{Arena, Pack};
 use scene::catalogue::Entry;
 use texmap::loops::Loop;
 use texmap::{Mapper, Order};

@@ -3,7 +3,7 @@
 use core::arch::asm;
 use core::arch::x86_64::{__cpuid, __cpuid_count};
 
-use link::TICKS_PER_SECOND;
+use protocol::TICKS_PER_SECOND;
 
 /// Returns the time stamp counter: the host's counter under plain TCG, and the number of instructions carried
 /// out under `-icount shift=0`. The compiler moves no memory access across the call.

@@ -3,8 +3,8 @@
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use link::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, PANIC};
 use modex::SetError;
+use protocol::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, PANIC};
 
 use super::frame::Frame;
 use super::serial::Unlocked;

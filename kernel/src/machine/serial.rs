@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use link::{ACKNOWLEDGE, CANCEL, Reception, TICKS_PER_SECOND};
+use protocol::{ACKNOWLEDGE, CANCEL, Reception, TICKS_PER_SECOND};
 use spin::Mutex;
 use uart_16550::backend::PioBackend;
 use uart_16550::spec::registers::{FifoTriggerLevel, IER};
@@ -88,7 +88,7 @@ pub fn listen() {
 /// Writes one framed line.
 pub fn line(text: fmt::Arguments<'_>) {
     if let Some(port) = &mut *SERIAL.lock() {
-        link::write_line(text, |bytes| port.send(bytes));
+        protocol::write_line(text, |bytes| port.send(bytes));
     }
 }
 
@@ -166,7 +166,7 @@ impl Unlocked {
 
     /// Writes one framed line.
     pub fn line(&mut self, text: fmt::Arguments<'_>) {
-        link::write_line(text, |bytes| self.send(bytes));
+        protocol::write_line(text, |bytes| self.send(bytes));
     }
 
     /// Waits until the host acknowledges, and discards commands that were on their way.

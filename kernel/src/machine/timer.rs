@@ -4,7 +4,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use link::TICKS_PER_SECOND;
+use protocol::TICKS_PER_SECOND;
 
 use super::ports;
 

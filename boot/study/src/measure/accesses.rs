@@ -4,7 +4,7 @@
 //! VGA whose accesses are counted. The checksums of the frames prove that both did the same work.
 
 use anyhow::{bail, ensure};
-use cost::{Ask, Bench, Clock, Memory, Work};
+use bench::{Ask, Bench, Clock, Memory, Work};
 use in_place::InPlace;
 use modex::{Bus, Counted, Tally};
 use texmap::{Mapper, Order};
@@ -63,7 +63,7 @@ impl<'a> Emulated<'a> {
         }
     }
 
-    /// Returns the accesses of one frame of the ball, frame [`cost::FRAME`], that a mapper draws in an order
+    /// Returns the accesses of one frame of the ball, frame [`bench::FRAME`], that a mapper draws in an order
     /// on a page that holds the same frame already.
     ///
     /// # Errors

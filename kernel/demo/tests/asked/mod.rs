@@ -1,8 +1,8 @@
 //! A show on the emulated card, asked on its serial line.
 
+use demo::{Memory, Show};
 use in_place::InPlace;
-use link::write_line;
-use show::{Memory, Show};
+use protocol::write_line;
 use vga::Vga;
 
 /// The lines of a command's answer.

@@ -3,8 +3,8 @@
 use core::fmt;
 use core::hint::black_box;
 
-use link::{Checksum, ERROR, Lines, OK};
 use modex::{Bus, Destination, HEIGHT, ModeX, Offscreen, PlanarBuffer, SetError, WIDTH};
+use protocol::{Checksum, ERROR, Lines, OK};
 use scene::{Pose, Stage, Storage};
 use texmap::{Job, JobList, Mapper, Order, Stats, Texture};
 

@@ -4,10 +4,10 @@
 mod asked;
 
 use asked::{ask, done, memory};
+use demo::Show;
 use fastrand::Rng;
-use link::Action;
+use protocol::Action;
 use scene::catalogue::CATALOGUE;
-use show::Show;
 use texmap::{Mapper, Order};
 use vga::Vga;
 

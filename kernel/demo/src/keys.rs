@@ -10,8 +10,8 @@
 
 use core::fmt;
 
-use link::Action;
 use pc_keyboard::{KeyCode, KeyState, ScancodeSet, ScancodeSet1};
+use protocol::Action;
 
 /// A key and its action.
 #[derive(Clone, Copy, Debug)]

@@ -3,8 +3,8 @@
 mod asked;
 
 use asked::{ask, done};
-use link::Action;
-use show::{KEYS, Show};
+use demo::{KEYS, Show};
+use protocol::Action;
 use vga::Vga;
 
 /// Returns what is shown: checksums of the bytes, and the frame's name.

@@ -3,16 +3,16 @@
 //! `transcript.txt` is what a person at the serial line would see, without the checksums of lines. Each line
 //! is easy to read, and a change in any answer, in the overlay or in the split view changes the transcript.
 //! After an intended change, look at the difference, and run
-//! `UPDATE_EXPECT=1 cargo test -p show --test transcript`.
+//! `UPDATE_EXPECT=1 cargo test -p demo --test transcript`.
 
 mod asked;
 
 use std::fmt::Write;
 
 use asked::{ask, memory};
+use demo::Show;
 use expect_test::expect_file;
-use link::Reception;
-use show::Show;
+use protocol::Reception;
 use vga::Vga;
 
 /// The session's steps. `tick N` shows the running demo's frame of a tick, if it is due; `took N` sets how

@@ -5,7 +5,7 @@ mod asked;
 use std::thread;
 
 use asked::done;
-use show::Show;
+use demo::Show;
 use vga::Vga;
 
 /// A quarter of a thread's default stack.

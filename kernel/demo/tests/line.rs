@@ -3,10 +3,10 @@
 mod asked;
 
 use asked::{ask, done, memory};
-use link::Reception;
+use demo::Show;
 use modex::Purpose;
 use modex::registers::MISC_WRITE;
-use show::Show;
+use protocol::Reception;
 use vga::Vga;
 
 /// Returns how often the card's mode was set.

@@ -21,13 +21,13 @@ mod steering;
 
 use core::fmt;
 
-use link::dump::{self, Header, OrNone};
-use link::{
+use model::{Arena, Pack};
+use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, SetError, Tally, WIDTH};
+use protocol::dump::{self, Header, OrNone};
+use protocol::{
     Action, Change, Command, Content, ERROR, Fault, Lines, Motion, OK, PROTOCOL, Picture, RUNNING,
     Reception, Setting, Word,
 };
-use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, SetError, Tally, WIDTH};
-use pack::{Arena, Pack};
 use scene::catalogue::{Entry, MAX_TEXELS};
 use scene::{Pose, Stage, Storage};
 use texmap::{Mapper, Order, Stats};

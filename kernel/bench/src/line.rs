@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use link::{FrameError, unframe};
+use protocol::{FrameError, unframe};
 use texmap::{Mapper, Order};
 
 /// Most rounds of one measurement.

@@ -11,8 +11,8 @@
 use core::array;
 use core::fmt::{self, Write};
 
-use link::{Action, TICKS_PER_SECOND};
 use modex::{Destination, HEIGHT, Palette, WIDTH};
+use protocol::{Action, TICKS_PER_SECOND};
 use scene::font;
 use scene::motion::Motion;
 use texmap::{Mapper, Order};

@@ -7,7 +7,7 @@
 //!
 //! # The protocol
 //!
-//! As in [`link`]: lines have checksums, and the last line of an answer is `ok` with the request, or `error`.
+//! As in [`protocol`]: lines have checksums, and the last line of an answer is `ok` with the request, or `error`.
 //! The kernel sends nothing during a measurement.
 //!
 //! | line | answer, before `ok` |

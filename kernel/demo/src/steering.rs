@@ -14,7 +14,7 @@
 //! Keys repeat. The legal ranges bound what a repeated key can do, so holding a key down for an hour does no
 //! more than holding it down for a minute.
 
-use link::{Action, Change, Setting, Word};
+use protocol::{Action, Change, Setting, Word};
 use scene::Pose;
 use scene::catalogue::{CATALOGUE, Entry};
 use texmap::{Mapper, Order, Tolerance};
