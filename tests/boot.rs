@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use frames::card::{self, Card, Emulated};
 use modex::registers::MODE_X;
-use protocol::{Action, Change, Command, Content, Fault, Picture};
+use protocol::{Action, Change, Command, Content, Fault, FrameName};
 use qemu::{Config, Limits, Machine, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -46,7 +46,7 @@ fn short() -> Limits {
 #[test]
 fn the_registers_read_back_as_the_table_says() {
     let mut machine = boot();
-    machine.ask(Command::Show(Picture::Frame(0))).unwrap();
+    machine.ask(Command::Show(FrameName::Number(0))).unwrap();
     let answer = machine.ask(Command::Registers).unwrap();
     for ((block, expected), line) in MODE_X.blocks().into_iter().zip(&answer) {
         let (name, values) = line.split_once(' ').unwrap();
@@ -130,10 +130,7 @@ fn the_running_show_paces_itself_and_can_be_held() {
     assert_eq!(pace(&mut machine), None);
     let still = machine.screen().unwrap();
     machine.rest(Duration::from_millis(300)).unwrap();
-    assert!(
-        still == machine.screen().unwrap(),
-        "the held picture changed"
-    );
+    assert!(still == machine.screen().unwrap(), "the held frame changed");
     machine.ask(Command::Run).unwrap();
     machine.wait_until_running().unwrap();
     machine.leave().unwrap();
@@ -203,14 +200,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
     machine.rest(Duration::from_millis(100)).unwrap();
     let shown = machine.dump(Content::Page).unwrap();
     let screen = machine.screen().unwrap();
-    assert!(
-        shown
-            .header
-            .picture
-            .unwrap()
-            .to_string()
-            .starts_with("pose ")
-    );
+    assert!(shown.header.frame.unwrap().to_string().starts_with("pose "));
 
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
@@ -226,7 +216,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
             (again.header.scene, again.header.mapper),
             (shown.header.scene.clone(), shown.header.mapper)
         );
-        assert_eq!(again.header.picture, shown.header.picture);
+        assert_eq!(again.header.frame, shown.header.frame);
         assert!(again.pixels == shown.pixels && again.palette == shown.palette);
         assert!(card.screen().unwrap() == screen);
     }
@@ -559,7 +549,7 @@ fn crystal_ball(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn without_a_display_a_picture_is_left_and_so_by_a_second_one_beside_it() {
+fn without_a_display_a_frame_is_left_and_so_by_a_second_one_beside_it() {
     LazyLock::force(&READY);
     let arguments: [&[&str]; 2] = [&[], &["--scene", "cube", "--mapper", "within-1/4"]];
     let both = thread::scope(|scope| {
@@ -574,17 +564,17 @@ fn without_a_display_a_picture_is_left_and_so_by_a_second_one_beside_it() {
         String::from_utf8(output.stdout).unwrap()
     });
     assert!(
-        cube.ends_with("picture-cube-within-1_4.png\n"),
+        cube.ends_with("frame-cube-within-1_4.png\n"),
         "{ball}{cube}"
     );
-    for (picture, look) in [
+    for (frame, look) in [
         (ball, &[][..]),
         (cube, &["scene cube", "mapper within-1/4"][..]),
     ] {
-        let file = BufReader::new(File::open(picture.trim()).unwrap());
-        let mut picture = png::Decoder::new(file).read_info().unwrap();
-        let mut bytes = vec![0; picture.output_buffer_size().unwrap()];
-        let info = picture.next_frame(&mut bytes).unwrap();
+        let file = BufReader::new(File::open(frame.trim()).unwrap());
+        let mut frame = png::Decoder::new(file).read_info().unwrap();
+        let mut bytes = vec![0; frame.output_buffer_size().unwrap()];
+        let info = frame.next_frame(&mut bytes).unwrap();
         assert_eq!(
             (info.width, info.height, info.line_size),
             (640, 480, 3 * 640)
@@ -597,12 +587,14 @@ fn without_a_display_a_picture_is_left_and_so_by_a_second_one_beside_it() {
             emulated.ask(Command::parse(command).unwrap()).unwrap();
         }
         let mut is_of = |frame| {
-            emulated.ask(Command::Show(Picture::Frame(frame))).unwrap();
+            emulated
+                .ask(Command::Show(FrameName::Number(frame)))
+                .unwrap();
             emulated.screen().unwrap().pixels.as_flattened() == bytes
         };
         assert!(
             (0..3600).any(&mut is_of),
-            "the picture is none of the show's: {look:?}"
+            "the frame is none of the show's: {look:?}"
         );
     }
 }

@@ -9,7 +9,7 @@ use frames::dump::Dump;
 use frames::indexed::Indexed;
 use frames::screen::Screen;
 use protocol::dump::{Header, PLANE_BYTES};
-use protocol::{Content, Picture, Word};
+use protocol::{Content, FrameName, Word};
 use tempfile::TempDir;
 
 /// A folder of files to compare; the program runs in it.
@@ -78,9 +78,9 @@ fn dump(content: Content) -> Dump {
         header: Header {
             content,
             scene: "ball".into(),
-            pack: None,
+            model_file: None,
             mapper: Word::new("exact"),
-            picture: Some(Picture::Frame(480)),
+            frame: Some(FrameName::Number(480)),
             motion: None,
             start: 0x4B00,
             width: 320,
@@ -105,9 +105,9 @@ fn file(content: Content, change: impl FnOnce(&mut Dump)) -> Vec<u8> {
 
 /// A PNG as a file, after `change`.
 fn png(change: impl FnOnce(&mut Indexed)) -> Vec<u8> {
-    let (mut picture, mut bytes) = (dump(Content::Page).picture(), Vec::new());
-    change(&mut picture);
-    picture.write_png(&mut bytes).unwrap();
+    let (mut frame, mut bytes) = (dump(Content::Page).frame(), Vec::new());
+    change(&mut frame);
+    frame.write_png(&mut bytes).unwrap();
     bytes
 }
 
@@ -145,7 +145,7 @@ fn what_differs_is_told_in_a_line() {
     world.put("elsewhere", page(|dump| dump.header.start = 0));
     world.put("colour", page(|dump| dump.palette[3] = [0x2A, 0x1C, 0x0F]));
     world.put("a.png", png(|_| {}));
-    world.put("pixel.png", png(|picture| picture.pixels[321] ^= 1));
+    world.put("pixel.png", png(|frame| frame.pixels[321] ^= 1));
     world.put("all", file(Content::Memory, |_| {}));
     let at = 4 * 0x4B50 + 2;
     world.put(
@@ -183,7 +183,7 @@ fn folders_are_matched_by_name_and_all_of_it_is_told() {
     }
     let equal = "equal: 2 pairs, 153600 pixels\n";
     says(world.diff(&["a", "b"]), 0, equal, "");
-    world.put("b/2.png", png(|picture| picture.pixels[321] ^= 1));
+    world.put("b/2.png", png(|frame| frame.pixels[321] ^= 1));
     let different = format!("2.png differs: {FIRST}\n1 of 2 pairs differs\n");
     says(world.diff(&["a", "b/"]), 1, &different, "");
     // Missing files are reported first, and the rest is compared nevertheless.
@@ -231,7 +231,7 @@ fn what_cannot_be_compared_is_told_with_words() {
         }),
     );
     world.put("a.png", png(|_| {}));
-    world.put("order.png", png(|picture| picture.palette.swap(3, 200)));
+    world.put("order.png", png(|frame| frame.palette.swap(3, 200)));
     let order = "the palettes hold the same colours in another order (entry 03: expected 000303, \
                  got 320800); indices can't be compared";
     for (a, b, why) in [
@@ -251,7 +251,7 @@ fn what_cannot_be_compared_is_told_with_words() {
 }
 
 #[test]
-fn files_that_are_no_dumps_or_pictures_are_told_apart() {
+fn files_that_are_no_dumps_or_frames_are_told_apart() {
     let world = World::new();
     let good = String::from_utf8(page(|_| {})).unwrap();
     let lines: Vec<_> = good.split_inclusive('\n').collect();
@@ -262,8 +262,8 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         });
         String::from_utf8(line).unwrap()
     };
-    let picture = png(|_| {});
-    let mut huge = picture.clone();
+    let frame = png(|_| {});
+    let mut huge = frame.clone();
     // The header's size and its checksum.
     huge[16..24].copy_from_slice(&[0x7F, 0xFF, 0xFF, 0xFF, 0x7F, 0xFF, 0xFF, 0xFF]);
     let mut checksum = protocol::Checksum::new();
@@ -315,15 +315,15 @@ fn files_that_are_no_dumps_or_pictures_are_told_apart() {
         ),
         (
             "cut.png",
-            picture[..picture.len() / 2].into(),
+            frame[..frame.len() / 2].into(),
             ["it is no whole PNG", ""],
         ),
         (
             "end.png",
-            picture[..picture.len() - 12].into(),
+            frame[..frame.len() - 12].into(),
             ["it is no whole PNG", ""],
         ),
-        ("head.png", picture[..20].into(), ["it is no whole PNG", ""]),
+        ("head.png", frame[..20].into(), ["it is no whole PNG", ""]),
         (
             "rgb.png",
             rgb,
@@ -391,7 +391,7 @@ fn the_report_shows_every_pair_that_differs() {
     world.put("a/4.dump", file(Content::Memory, |_| {}));
     world.put("b/4.dump", byte);
     world.put("a/5.png", png(|_| {}));
-    world.put("b/5.png", png(|picture| picture.pixels.fill(7)));
+    world.put("b/5.png", png(|frame| frame.pixels.fill(7)));
     world.put("a/6.dump", page(|_| {}));
     let said = world.diff(&["a", "b", "--report", "it differs.html"]);
     assert_eq!(said.code, Some(2));
@@ -441,7 +441,7 @@ fn the_report_shows_every_pair_that_differs() {
         assert!(copy == world.read(&format!("{folder}/1.dump")));
         let shown = fs::read(world.path(&format!("it differs-files/1.dump-{of}.png"))).unwrap();
         let shown = Indexed::read_png(Cursor::new(shown)).unwrap();
-        assert!(shown == Dump::read(copy.as_bytes()).unwrap().picture());
+        assert!(shown == Dump::read(copy.as_bytes()).unwrap().frame());
     }
     let difference = decode(&world.path("it differs-files/1.dump-difference.png"));
     let bright = |pixel: &[u8; 3]| pixel[0] != pixel[1] || pixel[1] != pixel[2];

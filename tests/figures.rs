@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use crystal_ball::golden_folder;
 use frames::card::{self, Card, Emulated};
 use frames::golden::{self, Findings, Golden, Transfer};
-use protocol::{Command, Content, Picture};
+use protocol::{Command, Content, FrameName};
 use qemu::{Config, Machine};
 use setup::Options;
 
@@ -25,7 +25,7 @@ fn figures() {
     let goldens = golden::find(&golden_folder()).expect("golden frames");
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).expect("an emulated card");
-    let (mut set_ups, mut kernels, mut pictures) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut set_ups, mut kernels, mut frames) = (Vec::new(), Vec::new(), Vec::new());
     let mut verified = Vec::new();
     for _ in 0..BOOTS {
         let start = Instant::now();
@@ -35,7 +35,7 @@ fn figures() {
         let mut machine = Machine::boot(&config).expect("boots");
         kernels.push(start.elapsed());
         machine.wait_until_running().expect("runs");
-        pictures.push(start.elapsed());
+        frames.push(start.elapsed());
         machine.leave().expect("leaves");
         let start = Instant::now();
         let mut machine = Machine::boot(&config).expect("boots");
@@ -45,7 +45,7 @@ fn figures() {
     }
     println!("set-up, warm:                  {}", spread(set_ups));
     println!("QEMU's start to the kernel:    {}", spread(kernels));
-    println!("QEMU's start to first picture: {}", spread(pictures));
+    println!("QEMU's start to first frame: {}", spread(frames));
     println!(
         "QEMU's start to first verified golden: {}",
         spread(verified)
@@ -93,19 +93,19 @@ fn figures() {
     let words: Vec<_> = pace.split(' ').collect();
     let [shown, late] = [words[2], words[4]].map(|n| n.parse::<f64>().expect("a number"));
     println!(
-        "pictures within a tick (16.7 ms) of the one before, over {} s: {:.2} % ({shown} shown, {late} late)",
+        "frames within a tick (16.7 ms) of the one before, over {} s: {:.2} % ({shown} shown, {late} late)",
         WATCHED.as_secs(),
         100.0 * (1.0 - late / shown),
     );
-    println!("writes for a picture:");
+    println!("writes for a frame:");
     for frame in [0, 240, 480] {
         machine
-            .ask(Command::Show(Picture::Frame(frame)))
+            .ask(Command::Show(FrameName::Number(frame)))
             .expect("shows");
         // The first frame of each page paints all of the background; the third round is typical.
         for _ in 0..5 {
             machine
-                .ask(Command::Show(Picture::Frame(frame)))
+                .ask(Command::Show(FrameName::Number(frame)))
                 .expect("shows");
         }
         println!("frame {frame}");

@@ -2,7 +2,7 @@
 //! or drawn, and nothing panics.
 //!
 //! Good files are changed at random, so that they pass the first checks and reach the later ones. The
-//! checksums of a pack and of a PNG's chunks are recomputed, or nothing behind the checksum would be reached.
+//! checksums of a model file and of a PNG's chunks are recomputed, or nothing behind the checksum would be reached.
 //! Every accepted file is drawn. A refusal's message is short and contains no terminal control sequence.
 //! `cargo test` does this for about a second. `cargo fuzz-models` does it for two minutes, or
 //! `CRYSTAL_BALL_FUZZ_MINUTES`, from the seed `CRYSTAL_BALL_FUZZ_SEED`, or a fresh one.
@@ -16,13 +16,13 @@ use fastrand::Rng;
 use frames::indexed::Indexed;
 use import::{Model, obj, solid, texture};
 use in_place::InPlace;
-use model::{Arena, MAX_BYTES, Pack, Parts};
+use model::{Arena, MAX_BYTES, ModelFile, Parts};
 use modex::PlanarBuffer;
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use scene::{MAX_EXTENT, Mesh, Pose, Stage, Storage};
 use texmap::{Mapper, Texture};
 
-/// The offset of a pack's counts, after magic, version, length and checksum.
+/// The offset of a model file's counts, after magic, version, length and checksum.
 const COUNTS: usize = 20;
 
 /// Prints the seed of a case that panicked.
@@ -54,9 +54,9 @@ impl Room {
         }
     }
 
-    /// Draws an accepted pack in a random pose, with a random mapper.
-    fn draw(&mut self, pack: &Pack<'_>, random: &mut Rng) {
-        let entry = pack.entry(&mut self.arena);
+    /// Draws an accepted model file in a random pose, with a random mapper.
+    fn draw(&mut self, model_file: &ModelFile<'_>, random: &mut Rng) {
+        let entry = model_file.entry(&mut self.arena);
         let textures = entry.paint(&mut self.painted);
         let mut stage = Stage::new(&mut self.storage, entry.scene(&textures));
         stage.set_mapper(Mapper::ALL[random.usize(..Mapper::ALL.len())].1);
@@ -117,9 +117,9 @@ fn objs() -> Vec<Vec<u8>> {
     ]
 }
 
-/// A pack from an OBJ, with a plain texture.
-fn packed(text: &[u8], picture: (u32, u32)) -> anyhow::Result<Vec<u8>> {
-    let (solid, layout) = solid(&obj::parse(text)?, picture)?;
+/// A model file from an OBJ, with a plain texture.
+fn packed(text: &[u8], frame: (u32, u32)) -> anyhow::Result<Vec<u8>> {
+    let (solid, layout) = solid(&obj::parse(text)?, frame)?;
     let (width, height) = layout.size();
     let texels = layout.cut(|i, j| (i ^ j) as u8);
     let parts = Parts {
@@ -154,7 +154,7 @@ fn run(
     (cases, accepted)
 }
 
-/// Numbers at the borders of ranges, in a pack's format.
+/// Numbers at the borders of ranges, in a model file's format.
 fn number(random: &mut Rng) -> i32 {
     let borders = [
         0,
@@ -183,12 +183,12 @@ fn number(random: &mut Rng) -> i32 {
     }
 }
 
-/// Changes a pack; returns whether it was accepted nevertheless.
-fn pack_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
+/// Changes a model file; returns whether it was accepted nevertheless.
+fn model_file_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
     let before = random.choice(good).unwrap();
     let mut bytes = before.clone();
     for _ in 0..random.usize(1..6) {
-        // Most of a pack is its light table, in which any byte is valid.
+        // Most of a model file is its light table, in which any byte is valid.
         let at = match random.u8(..4) {
             0 => random.usize(..COUNTS + 10),
             1 => random.usize(..bytes.len()),
@@ -208,7 +208,7 @@ fn pack_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
         }
     }
     if bytes != *before {
-        assert!(Pack::parse(&bytes).is_err(), "a change went unnoticed");
+        assert!(ModelFile::parse(&bytes).is_err(), "a change went unnoticed");
     }
     if random.u8(..8) > 0 && bytes.len() > COUNTS {
         // Magic and version stay; length and checksum are recomputed.
@@ -219,9 +219,9 @@ fn pack_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
         checksum.add(&bytes[COUNTS..]);
         bytes[16..20].copy_from_slice(&checksum.value().to_le_bytes());
     }
-    match Pack::parse(&bytes) {
-        Ok(pack) => {
-            room.draw(&pack, random);
+    match ModelFile::parse(&bytes) {
+        Ok(model_file) => {
+            room.draw(&model_file, random);
             true
         }
         Err(error) => {
@@ -318,18 +318,19 @@ fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
         }
     }
     let text = rewritten(lines.join(&b'\n'), random);
-    let picture = *random
+    let frame = *random
         .choice(&[(16, 16), (1, 1), (5, 300), (8192, 1)])
         .unwrap();
     if random.u8(..16) == 0 {
         // The whole path, including the messages that name formats.
         return Model::new(&text, None).inspect_err(check_message).is_ok();
     }
-    match packed(&text, picture) {
+    match packed(&text, frame) {
         Ok(bytes) => {
             assert!(bytes.len() <= MAX_BYTES);
-            let pack = Pack::parse(&bytes).expect("what is made of an OBJ is a good pack");
-            room.draw(&pack, random);
+            let model_file =
+                ModelFile::parse(&bytes).expect("what is made of an OBJ is a good model file");
+            room.draw(&model_file, random);
             true
         }
         Err(error) => {
@@ -453,8 +454,8 @@ fn is_read(bytes: &[u8]) -> bool {
         let _ = Indexed::read_png(Cursor::new(bytes));
     }
     match texture::read(Cursor::new(bytes)) {
-        Ok(picture) => {
-            let (width, height) = picture.pixels.dimensions();
+        Ok(frame) => {
+            let (width, height) = frame.pixels.dimensions();
             assert!(width > 0 && height > 0);
             true
         }
@@ -505,13 +506,13 @@ fn pngs() -> Vec<Vec<u8>> {
 fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
     let mut room = Room::new();
     let objs = objs();
-    let packs: Vec<_> = objs
+    let model_files: Vec<_> = objs
         .iter()
         .map(|text| packed(text, (16, 16)).unwrap())
         .collect();
     let pngs = pngs();
-    for bytes in &packs {
-        room.draw(&Pack::parse(bytes).unwrap(), &mut Rng::with_seed(seed));
+    for bytes in &model_files {
+        room.draw(&ModelFile::parse(bytes).unwrap(), &mut Rng::with_seed(seed));
     }
     for png in &pngs {
         texture::read(Cursor::new(png)).unwrap();
@@ -529,7 +530,9 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
         let some = accepted * 100 > cases && accepted < cases;
         assert!(some || cases < 1000, "{kind}");
     };
-    tell("packs", &mut |random| pack_case(&packs, &mut room, random));
+    tell("model files", &mut |random| {
+        model_file_case(&model_files, &mut room, random)
+    });
     tell("OBJs", &mut |random| obj_case(&objs, &mut room, random));
     tell("PNGs", &mut |random| png_case(&pngs, random));
     tell("PNGs' chunks", &mut |random| chunks_case(&pngs, random));

@@ -178,7 +178,7 @@ fn mixed_edges_leave_gaps_and_exact_ones_do_not() {
 
 #[test]
 #[ignore = "writes docs/gaps.png; run it by `cargo gaps`"]
-fn picture() {
+fn frame() {
     const BACKGROUND: u8 = 0;
     const GAP: u8 = 3;
     const DOUBLE: u8 = 4;
@@ -219,12 +219,12 @@ fn picture() {
         let row: Vec<u8> = row.iter().flat_map(|&pixel| [pixel; 2]).collect();
         [row.clone(), row].concat()
     });
-    let picture = Indexed {
+    let frame = Indexed {
         width: 4 * WIDTH,
         height: 2 * HEIGHT,
         palette,
         pixels: wide.collect(),
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/gaps.png");
-    picture.write_png(File::create(path).unwrap()).unwrap();
+    frame.write_png(File::create(path).unwrap()).unwrap();
 }

@@ -13,7 +13,7 @@ use crystal_ball::golden_folder;
 use frames::card::{self, Card, Emulated};
 use frames::difference::Subject;
 use frames::golden::{self, Findings, Golden, Transfer};
-use protocol::{Command, Content, Picture};
+use protocol::{Command, Content, FrameName};
 use qemu::{Config, Machine};
 use setup::Ready;
 use tempfile::TempDir;
@@ -210,7 +210,7 @@ pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
 /// drawing them.
 pub fn evidence(config: &Config) -> anyhow::Result<Vec<String>> {
     let mut machine = Machine::boot(config)?;
-    machine.show(&[0, 480, u32::MAX].map(Picture::Frame))?;
+    machine.show(&[0, 480, u32::MAX].map(FrameName::Number))?;
     let mut evidence = machine.ask(Command::Checksums(Content::Memory))?;
     evidence.extend(machine.ask(Command::Counts)?);
     machine.leave()?;
@@ -222,7 +222,7 @@ pub fn emulated_evidence() -> Vec<String> {
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     emulated
-        .show(&[0, 480, u32::MAX].map(Picture::Frame))
+        .show(&[0, 480, u32::MAX].map(FrameName::Number))
         .unwrap();
     let mut evidence = emulated.ask(Command::Checksums(Content::Memory)).unwrap();
     evidence.extend(emulated.ask(Command::Counts).unwrap());
@@ -283,7 +283,7 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
     for (description, words) in [
         ("about = \"a\"", "missing field `show`"),
         ("about = \"a\"\nshow = []", "it shows nothing"),
-        ("about = \"a\"\nshow = [\"x\"]", "'x' is no picture"),
+        ("about = \"a\"\nshow = [\"x\"]", "'x' is no frame"),
         (
             "about = \"a\"\nshow = [\"0\"]\nmore = 1",
             "unknown field `more`",
@@ -306,7 +306,7 @@ fn the_wrong_frame_is_found() {
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut dump = |frame| {
-        emulated.show(&[Picture::Frame(frame)]).unwrap();
+        emulated.show(&[FrameName::Number(frame)]).unwrap();
         Subject::Dump(emulated.dump(Content::Page).unwrap())
     };
     let mut findings = Findings::default();
@@ -315,7 +315,7 @@ fn the_wrong_frame_is_found() {
     assert!(findings.found().is_empty());
     findings.compare(golden, "frames", &dump(480), &dump(481));
     let found = findings.found()[0].to_string();
-    assert!(found.contains("picture: expected 480, got 481"), "{found}");
+    assert!(found.contains("frame: expected 480, got 481"), "{found}");
 }
 
 /// Runs the program: it prints and shows the changes, boots QEMU, and writes the PNGs.
@@ -353,9 +353,9 @@ fn all_of_video_memory_is_as_the_emulated_card_has_it() {
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     let mut machine = Machine::boot(&config()).unwrap();
-    let pictures = [0, 100, 200, 4_000_000_000, 300].map(Picture::Frame);
-    emulated.show(&pictures).unwrap();
-    machine.show(&pictures).unwrap();
+    let frames = [0, 100, 200, 4_000_000_000, 300].map(FrameName::Number);
+    emulated.show(&frames).unwrap();
+    machine.show(&frames).unwrap();
     let (expected, got) = (
         emulated.dump(Content::Memory).unwrap(),
         machine.dump(Content::Memory).unwrap(),
@@ -476,14 +476,14 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
     // The fourth frame erases what the first left on its page.
-    let before = [0, 60, 120].map(Picture::Frame);
+    let before = [0, 60, 120].map(FrameName::Number);
     emulated.show(&before).unwrap();
     machine.show(&before).unwrap();
     let events = ["vga_std_write_io", "memory_region_ops_write"];
     for event in events {
         machine.trace(event, true).unwrap();
     }
-    let show = Command::Show(Picture::Frame(180));
+    let show = Command::Show(FrameName::Number(180));
     machine.ask(show).unwrap();
     for event in events {
         machine.trace(event, false).unwrap();

@@ -2,10 +2,10 @@
 //!
 //! `cargo test --test host diff::` runs the tests of one module.
 
+mod by_definition;
 mod diff;
 mod fuzz;
 mod gaps;
 mod import;
 mod mutants;
-mod pictures;
 mod trade;

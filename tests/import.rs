@@ -311,7 +311,7 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
         (
             "png.obj",
             &png,
-            " its content is PNG, not a Wavefront OBJ; a picture goes behind --texture",
+            " its content is PNG, not a Wavefront OBJ; a frame goes behind --texture",
         ),
         (
             "wide.obj",
@@ -553,7 +553,7 @@ fn bytes_of_dumps_and_descriptions_are_escaped() {
             r"\x1b]0;title\x07: it cannot be read",
         ),
         (&["bless", "golden"], 1, "line 2: "),
-        (&["bless", "keys"], 1, r"'\x1b[31m' is no picture"),
+        (&["bless", "keys"], 1, r"'\x1b[31m' is no frame"),
         (&["--scene", evil], 2, "for '--scene <NAME>'"),
     ] {
         let (ended, words) = run(path, arguments);

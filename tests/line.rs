@@ -12,7 +12,7 @@ use std::time::Duration;
 
 use frames::card::{self, Card, Emulated};
 use frames::dump::Dump;
-use protocol::{Command, Content, Picture};
+use protocol::{Command, Content, FrameName};
 use qemu::{Config, Limits, Machine, Verdict};
 
 use crate::judged::{Judged, verdict};
@@ -34,7 +34,7 @@ fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Machine {
         host
     };
     let mut machine = Machine::boot_through(&config, tap).expect("boots");
-    machine.show(&[Picture::Frame(480)]).expect("shows");
+    machine.show(&[FrameName::Number(480)]).expect("shows");
     machine
 }
 
@@ -240,7 +240,7 @@ fn line_ends_of_a_terminal_are_accepted() {
     let returned = |_, line: &[u8]| [&line[..line.len() - 1], b"\r\n"].concat();
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
-    emulated.show(&[Picture::Frame(480)]).unwrap();
+    emulated.show(&[FrameName::Number(480)]).unwrap();
     let expected = emulated.dump(Content::Page).unwrap();
     assert_eq!(dump_altered(returned).unwrap(), expected);
 }
@@ -367,7 +367,7 @@ fn noise_on_the_line_is_answered_and_survived() {
 #[test]
 fn a_flood_of_noise_changes_no_byte() {
     let mut machine = Machine::boot(&config()).unwrap();
-    machine.show(&[Picture::Frame(7)]).unwrap();
+    machine.show(&[FrameName::Number(7)]).unwrap();
     let before = machine.ask(Command::Checksums(Content::Memory)).unwrap();
     let mut state = seeded::generator().get_seed() << 1 | 1;
     let mut random = move || {

@@ -5,7 +5,7 @@ use std::fs;
 use frames::card::{self, Card, Emulated};
 use frames::screen::Screen;
 use import::Model;
-use protocol::{Command, Content, Picture, Setting, Word};
+use protocol::{Command, Content, FrameName, Setting, Word};
 use qemu::{Config, Machine};
 use setup::Options;
 use tempfile::TempDir;
@@ -47,16 +47,16 @@ fn model() -> Model {
     Model::load(&obj, Some(&png)).unwrap()
 }
 
-/// A machine whose ramdisk contains these bytes. If `pack` is a checksum, the machine must accept the pack
+/// A machine whose ramdisk contains these bytes. If `model_file` is a checksum, the machine must accept the model file
 /// with it.
-fn boot(ramdisk: Vec<u8>, pack: Option<u32>) -> Machine {
+fn boot(ramdisk: Vec<u8>, model_file: Option<u32>) -> Machine {
     let options = Options {
         ramdisk: Some(ramdisk),
         ..Options::default()
     };
     let ready = ready::with(&options);
     let config = Config {
-        pack,
+        model_file,
         ..Config::new(&ready)
     };
     Machine::boot(&config).expect("boots")
@@ -65,26 +65,26 @@ fn boot(ramdisk: Vec<u8>, pack: Option<u32>) -> Machine {
 #[test]
 fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
     let model = model();
-    let pack = model.pack();
-    let mut machine = boot(model.bytes.clone(), Some(pack.checksum()));
+    let model_file = model.file();
+    let mut machine = boot(model.bytes.clone(), Some(model_file.checksum()));
     let mut memory = card::memory();
-    let mut emulated = Emulated::with(&mut memory, Some(&pack)).unwrap();
-    let pictures = [
-        Picture::Frame(0),
-        Picture::Frame(250),
-        Picture::Pose {
+    let mut emulated = Emulated::with(&mut memory, Some(&model_file)).unwrap();
+    let frames = [
+        FrameName::Number(0),
+        FrameName::Number(250),
+        FrameName::Pose {
             yaw: 0x2345_6789,
             pitch: 0x1000_0000,
             roll: 0x8000_0000,
             distance: 0x1_2000,
         },
     ];
-    for picture in pictures {
+    for frame in frames {
         let [seen, told]: [_; 2] =
-            [&mut machine as &mut dyn Asked, &mut emulated].map(|card| card.dump_of(picture));
-        assert_eq!(seen, told, "{picture}");
+            [&mut machine as &mut dyn Asked, &mut emulated].map(|card| card.dump_of(frame));
+        assert_eq!(seen, told, "{frame}");
         assert_eq!(seen.header.scene, "model");
-        assert_eq!(seen.header.pack, Some(pack.checksum()));
+        assert_eq!(seen.header.model_file, Some(model_file.checksum()));
         assert_eq!(machine.screen().unwrap(), emulated.screen().unwrap());
     }
     // A built-in scene is no loaded model, whatever the ramdisk contains.
@@ -93,7 +93,7 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
         let scenes = card.asked(Command::Set(Setting::Scene, None));
         assert!(scenes.last().unwrap().starts_with("*model "), "{scenes:?}");
         card.asked(ball);
-        assert_eq!(card.dumped().header.pack, None);
+        assert_eq!(card.dumped().header.model_file, None);
     }
     machine.leave().unwrap();
 }
@@ -102,9 +102,9 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
 trait Asked {
     fn asked(&mut self, command: Command) -> Vec<String>;
     fn dumped(&mut self) -> frames::dump::Dump;
-    fn dump_of(&mut self, picture: Picture) -> frames::dump::Dump {
+    fn dump_of(&mut self, frame: FrameName) -> frames::dump::Dump {
         self.asked(Command::Hold);
-        self.asked(Command::Show(picture));
+        self.asked(Command::Show(frame));
         self.dumped()
     }
 }
@@ -128,13 +128,13 @@ fn a_damaged_ramdisk_is_told_and_the_built_in_scenes_are_there() {
     machine.wait_until_running().unwrap();
     let said = machine.said_of_pack().unwrap().to_string();
     assert!(
-        said.starts_with("refused pack: its header says checksum "),
+        said.starts_with("refused model: its header says checksum "),
         "{said}"
     );
     let mut memory = card::memory();
     let mut emulated = Emulated::new(&mut memory).unwrap();
-    let ball = emulated.dump_of(Picture::Frame(480));
+    let ball = emulated.dump_of(FrameName::Number(480));
     assert_eq!(ball.header.scene, "ball");
-    assert_eq!(machine.dump_of(Picture::Frame(480)), ball);
+    assert_eq!(machine.dump_of(FrameName::Number(480)), ball);
     machine.leave().unwrap();
 }

@@ -29,10 +29,10 @@ fn crystal_ball(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Stri
 }
 
 /// The only image of a PNG.
-fn picture(path: &Path) -> Indexed {
+fn frame(path: &Path) -> Indexed {
     match Subject::read(path).unwrap() {
-        Subject::Picture(picture) => picture,
-        Subject::Dump(_) => panic!("{} is no picture", path.display()),
+        Subject::Png(frame) => frame,
+        Subject::Dump(_) => panic!("{} is not a PNG", path.display()),
     }
 }
 
@@ -69,8 +69,8 @@ fn a_recording_has_the_emulated_cards_frames_and_the_same_bytes_each_time() {
     let colours = decoder.global_palette().unwrap().to_vec();
     let mut shown = vec![0; 320 * 240];
     for name in ["frame-000090.png", "frame-000095.png"] {
-        let expected = picture(&at("own").join(name));
-        assert_eq!(picture(&at("pngs").join(name)), expected);
+        let expected = frame(&at("own").join(name));
+        assert_eq!(frame(&at("pngs").join(name)), expected);
         let wide: Vec<u8> = expected
             .palette
             .iter()
@@ -114,7 +114,7 @@ fn what_cannot_be_recorded_or_replayed_is_told_and_leaves_nothing() {
         (
             "record --every 1 --out a.gif",
             2,
-            "--every 1: the pictures of a GIF are shown",
+            "--every 1: a GIF shows each frame for",
         ),
         (
             "record --frames 5..5 --out a.gif",

@@ -58,7 +58,7 @@ impl Common {
     pub fn config(&mut self, ready: &Ready, model: Option<&Model>) -> Config {
         Config {
             vga: std::mem::take(&mut self.vga),
-            pack: model.map(|model| model.pack().checksum()),
+            model_file: model.map(|model| model.file().checksum()),
             arguments: std::mem::take(&mut self.qemu_arguments),
             ..Config::new(ready)
         }

@@ -115,7 +115,7 @@ fn enlarged(window: Area, monitor: Area) -> Option<Area> {
     if !window.width.is_multiple_of(width) || above > window.height / 8 {
         return None;
     }
-    let fits = |of: u32, picture: u32| of * FIFTHS / 5 / picture;
+    let fits = |of: u32, frame: u32| of * FIFTHS / 5 / frame;
     let times = fits(monitor.width, width).min(fits(monitor.height, height));
     let (width, height) = (times * width, times * height + above);
     let (x, y) = monitor.middle();

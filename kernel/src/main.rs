@@ -13,7 +13,7 @@
 use bootloader_api::{BootInfo, BootloaderConfig};
 use crystal_ball_kernel::machine::{self, clock, keyboard, serial, timer};
 use demo::{Memory, Request, Show};
-use model::Pack;
+use model::ModelFile;
 use protocol::{LOADED, REFUSED};
 use spin::Mutex;
 
@@ -26,8 +26,8 @@ static BOOT: BootloaderConfig = machine::BOOT;
 fn start(boot_info: &'static mut BootInfo) -> ! {
     let machine = machine::init(boot_info);
     let mut memory = MEMORY.lock();
-    let pack = machine.ramdisk.and_then(taken);
-    let mut show = Show::new(&mut memory, machine.vga, pack.as_ref())
+    let model_file = machine.ramdisk.and_then(taken);
+    let mut show = Show::new(&mut memory, machine.vga, model_file.as_ref())
         .unwrap_or_else(|error| machine::report::adapter(error));
     let out: &mut demo::Out<'_> = &mut |line| serial::line(line);
     let stopwatch = clock::Stopwatch::start(timer::ticks());
@@ -60,16 +60,16 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     }
 }
 
-/// Returns the ramdisk's pack, and writes its checksum. A damaged pack is reported with its reason; the
+/// Returns the ramdisk's model file, and writes its checksum. A damaged model file is reported with its reason; the
 /// built-in scenes still work.
-fn taken(ramdisk: &'static [u8]) -> Option<Pack<'static>> {
-    match Pack::parse(ramdisk) {
-        Ok(pack) => {
-            serial::line(format_args!("{LOADED} pack {:08x}", pack.checksum()));
-            Some(pack)
+fn taken(ramdisk: &'static [u8]) -> Option<ModelFile<'static>> {
+    match ModelFile::parse(ramdisk) {
+        Ok(model_file) => {
+            serial::line(format_args!("{LOADED} model {:08x}", model_file.checksum()));
+            Some(model_file)
         }
         Err(error) => {
-            serial::line(format_args!("{REFUSED} pack: {error}"));
+            serial::line(format_args!("{REFUSED} model: {error}"));
             None
         }
     }

@@ -9,9 +9,9 @@
 use anyhow::{Context, anyhow, bail};
 use demo::{Memory, Show};
 use in_place::InPlace;
-use model::Pack;
+use model::ModelFile;
 use protocol::dump::{Header, PLANE_BYTES};
-use protocol::{Command, Content, ERROR, Motion, OK, Picture, Word};
+use protocol::{Command, Content, ERROR, FrameName, Motion, OK, Word};
 use scene::catalogue::Entry;
 use vga::Vga;
 
@@ -46,25 +46,25 @@ pub trait Card {
     /// The reason why no image can be captured.
     fn screen(&mut self) -> anyhow::Result<Screen>;
 
-    /// Holds and resets the demo, and shows `pictures` one after the other with the default options.
+    /// Holds and resets the demo, and shows `frames` one after the other with the default options.
     ///
     /// # Errors
     /// As [`Card::ask`].
-    fn show(&mut self, pictures: &[Picture]) -> anyhow::Result<()> {
-        self.show_as(&Look::default(), pictures)
+    fn show(&mut self, frames: &[FrameName]) -> anyhow::Result<()> {
+        self.show_as(&Look::default(), frames)
     }
 
     /// Does the same as [`Card::show`], with the options in `look`.
     ///
     /// # Errors
     /// As [`Card::ask`].
-    fn show_as(&mut self, look: &Look, pictures: &[Picture]) -> anyhow::Result<()> {
+    fn show_as(&mut self, look: &Look, frames: &[FrameName]) -> anyhow::Result<()> {
         self.ask(Command::Hold)?;
         for command in look.commands() {
             self.ask(command)?;
         }
-        for &picture in pictures {
-            self.ask(Command::Show(picture))?;
+        for &frame in frames {
+            self.ask(Command::Show(frame))?;
         }
         Ok(())
     }
@@ -75,7 +75,7 @@ pub trait Card {
 pub struct Emulated<'a> {
     show: Show<'a, Vga>,
     /// The checksum of the model file, if one is loaded.
-    pack: Option<u32>,
+    model_file: Option<u32>,
 }
 
 impl<'a> Emulated<'a> {
@@ -87,14 +87,17 @@ impl<'a> Emulated<'a> {
         Self::with(memory, None)
     }
 
-    /// Returns the same as [`Emulated::new`], with the model in `pack` as the default scene.
+    /// Returns the same as [`Emulated::new`], with the model in `model_file` as the default scene.
     ///
     /// # Errors
     /// As [`Emulated::new`].
-    pub fn with(memory: &'a mut Memory, pack: Option<&Pack<'a>>) -> anyhow::Result<Self> {
+    pub fn with(
+        memory: &'a mut Memory,
+        model_file: Option<&ModelFile<'a>>,
+    ) -> anyhow::Result<Self> {
         let mut this = Self {
-            show: Show::new(memory, Vga::new(), pack)?,
-            pack: pack.map(Pack::checksum),
+            show: Show::new(memory, Vga::new(), model_file)?,
+            model_file: model_file.map(ModelFile::checksum),
         };
         this.ask(Command::Hold)?;
         Ok(this)
@@ -142,8 +145,8 @@ impl Card for Emulated<'_> {
         let scene = said("scene")?;
         let mapper =
             words("drawn")?.map(|name| Word::new(name).context("a mapper's name is a word"));
-        let picture = words("picture")?.map(|name| {
-            Picture::parse(name.split(' ')).with_context(|| format!("'{name}' is no picture"))
+        let frame = words("frame")?.map(|name| {
+            FrameName::parse(name.split(' ')).with_context(|| format!("'{name}' is no frame"))
         });
         let motion = words("motion")?.map(|parts| {
             Motion::parse(parts.split(' ')).with_context(|| format!("'{parts}' is no motion"))
@@ -160,9 +163,9 @@ impl Card for Emulated<'_> {
             header: Header {
                 content,
                 scene: scene.into(),
-                pack: self.pack.filter(|_| scene == Entry::LOADED),
+                model_file: self.model_file.filter(|_| scene == Entry::LOADED),
                 mapper: mapper.transpose()?,
-                picture: picture.transpose()?,
+                frame: frame.transpose()?,
                 motion: motion.transpose()?,
                 start: page.start,
                 width: page.width.try_into()?,
@@ -175,12 +178,12 @@ impl Card for Emulated<'_> {
 
     fn screen(&mut self) -> anyhow::Result<Screen> {
         let vga = self.show.bus();
-        let picture = vga.scan_out().map_err(|fault| anyhow!("{fault}"))?;
+        let frame = vga.scan_out().map_err(|fault| anyhow!("{fault}"))?;
         let wide = |colour: [u8; 3]| colour.map(widen);
         Ok(Screen {
-            width: picture.width,
-            height: picture.height,
-            pixels: picture.dots.into_iter().map(wide).collect(),
+            width: frame.width,
+            height: frame.height,
+            pixels: frame.dots.into_iter().map(wide).collect(),
         })
     }
 }
@@ -194,8 +197,8 @@ mod tests {
     fn what_the_program_reads_back_is_what_the_card_holds() {
         let mut memory = memory();
         let mut card = Emulated::new(&mut memory).unwrap();
-        for pictures in [&[][..], &[Picture::Frame(0)], &[Picture::Frame(7); 3]] {
-            card.show(pictures).unwrap();
+        for frames in [&[][..], &[FrameName::Number(0)], &[FrameName::Number(7); 3]] {
+            card.show(frames).unwrap();
             for content in [Content::Page, Content::Memory] {
                 let seen = card.dump(content).unwrap();
                 let told = card.ask(Command::Dump(content)).unwrap();
@@ -213,7 +216,7 @@ mod tests {
     fn a_refused_command_says_why() {
         let mut memory = memory();
         let mut card = Emulated::new(&mut memory).unwrap();
-        let far = Picture::Pose {
+        let far = FrameName::Pose {
             yaw: 0,
             pitch: 0,
             roll: 0,

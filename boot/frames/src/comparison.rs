@@ -196,9 +196,7 @@ impl<W: Write> Findings<'_, W> {
         match compare(&expected, &got) {
             Ok(None) => {
                 self.pixels += match (&expected, &got) {
-                    (Subject::Picture(picture), _) | (_, Subject::Picture(picture)) => {
-                        picture.pixels.len()
-                    }
+                    (Subject::Png(frame), _) | (_, Subject::Png(frame)) => frame.pixels.len(),
                     (Subject::Dump(dump), _) => dump.pixels.len(),
                 };
                 if let Some(report) = &mut self.report {

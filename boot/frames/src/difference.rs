@@ -36,7 +36,7 @@ pub enum Subject {
     /// The contents of a VGA.
     Dump(Dump),
     /// A frame from an indexed PNG.
-    Picture(Indexed),
+    Png(Indexed),
 }
 
 impl Subject {
@@ -55,10 +55,10 @@ impl Subject {
             .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
             .context("it cannot be read")?;
         if bytes.len() as u64 > MAX_BYTES {
-            bail!("it has more than {MAX_BYTES} bytes: it is neither dump nor picture");
+            bail!("it has more than {MAX_BYTES} bytes: it is neither dump nor frame");
         }
         if bytes.starts_with(PNG) {
-            return Ok(Self::Picture(read_png(&bytes)?));
+            return Ok(Self::Png(read_png(&bytes)?));
         }
         let dump = Dump::read(&bytes);
         Ok(Self::Dump(dump.map_err(|error| {
@@ -71,10 +71,10 @@ impl Subject {
     }
 
     /// Returns the frame on the screen.
-    pub(crate) fn picture(&self) -> Cow<'_, Indexed> {
+    pub(crate) fn frame(&self) -> Cow<'_, Indexed> {
         match self {
-            Self::Dump(dump) => Cow::Owned(dump.picture()),
-            Self::Picture(picture) => Cow::Borrowed(picture),
+            Self::Dump(dump) => Cow::Owned(dump.frame()),
+            Self::Png(frame) => Cow::Borrowed(frame),
         }
     }
 }
@@ -289,7 +289,7 @@ pub fn compare(expected: &Subject, got: &Subject) -> anyhow::Result<Option<Diffe
     let difference = match (expected, got) {
         (Subject::Dump(expected), Subject::Dump(got)) => compare_dumps(expected, got)?,
         (expected, got) => {
-            let (expected, got) = (expected.picture(), got.picture());
+            let (expected, got) = (expected.frame(), got.frame());
             same_size((expected.width, expected.height), (got.width, got.height))?;
             same_order(&expected.palette, &got.palette)?;
             let shape = Shape {
@@ -316,27 +316,29 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
         );
     }
     same_size((a.width, a.height), (b.width, b.height))?;
-    if let (Some(expected), Some(got)) = (a.pack, b.pack)
+    if let (Some(expected), Some(got)) = (a.model_file, b.model_file)
         && expected != got
     {
         bail!(
-            "they show different models: expected is of the pack {expected:08x}, got of \
+            "they show different models: expected is of the model file {expected:08x}, got of \
              {got:08x}; take both with the same --model and --texture"
         );
     }
-    let pack = |pack: Option<u32>| pack.map_or("none".into(), |pack| format!("{pack:08x}"));
+    let model_file = |model_file: Option<u32>| {
+        model_file.map_or("none".into(), |model_file| format!("{model_file:08x}"))
+    };
     let fields = [
         ("scene", a.scene.clone(), b.scene.clone()),
-        ("pack", pack(a.pack), pack(b.pack)),
+        ("model", model_file(a.model_file), model_file(b.model_file)),
         (
             "mapper",
             OrNone(&a.mapper).to_string(),
             OrNone(&b.mapper).to_string(),
         ),
         (
-            "picture",
-            OrNone(&a.picture).to_string(),
-            OrNone(&b.picture).to_string(),
+            "frame",
+            OrNone(&a.frame).to_string(),
+            OrNone(&b.frame).to_string(),
         ),
         (
             "motion",
@@ -548,7 +550,7 @@ impl fmt::Display for Field {
 #[cfg(test)]
 mod tests {
     use protocol::dump::Header;
-    use protocol::{Picture, Word};
+    use protocol::{FrameName, Word};
 
     use super::*;
 
@@ -566,9 +568,9 @@ mod tests {
             header: Header {
                 content,
                 scene: "ball".into(),
-                pack: None,
+                model_file: None,
                 mapper: Word::new("exact"),
-                picture: Some(Picture::Frame(480)),
+                frame: Some(FrameName::Number(480)),
                 motion: None,
                 start: 0x4B00,
                 width: 320,
@@ -667,17 +669,17 @@ mod tests {
             got.pixels[0] = 9;
             got.palette[0] = [1, 1, 1];
             got.header.scene = "cube".into();
-            got.header.picture = None;
+            got.header.frame = None;
         });
         assert_eq!(
             all,
             "1 of 262144 bytes differs, first plane 0, address 0000 (page 0, x 0, y 0): \
              expected 00, got 09; in plane 0: 1, 1: 0, 2: 0, 3: 0; in page 0: 1; \
              1 of 256 palette entries differs, first 00: expected 000000, got 010101; \
-             scene: expected ball, got cube; picture: expected 480, got none"
+             scene: expected ball, got cube; frame: expected 480, got none"
         );
-        let model = told(Content::Page, |got| got.header.pack = Some(0x1A2B));
-        assert_eq!(model, "pack: expected none, got 00001a2b");
+        let model = told(Content::Page, |got| got.header.model_file = Some(0x1A2B));
+        assert_eq!(model, "model: expected none, got 00001a2b");
     }
 
     #[test]
@@ -692,16 +694,16 @@ mod tests {
     }
 
     #[test]
-    fn a_dump_is_compared_with_a_picture_as_a_picture() {
+    fn a_dump_is_compared_with_a_frame_as_a_frame() {
         for content in [Content::Page, Content::Memory] {
             let dump = dump(content);
-            let mut picture = dump.picture();
+            let mut frame = dump.frame();
             let dump = Subject::Dump(dump);
-            let same = Subject::Picture(picture.clone());
+            let same = Subject::Png(frame.clone());
             assert_eq!(compare(&dump, &same).unwrap(), None);
             assert_eq!(compare(&same, &dump).unwrap(), None);
-            picture.pixels[321] ^= 1;
-            let difference = compare(&Subject::Picture(picture), &dump);
+            frame.pixels[321] ^= 1;
+            let difference = compare(&Subject::Png(frame), &dump);
             let pixels = difference.unwrap().unwrap().pixels.unwrap();
             assert_eq!((pixels.count, pixels.of), (1, 320 * 240));
             assert_eq!(
@@ -717,13 +719,13 @@ mod tests {
     }
 
     #[test]
-    fn a_pictures_palette_may_differ_but_not_be_in_another_order() {
-        let picture = dump(Content::Page).picture();
+    fn a_frames_palette_may_differ_but_not_be_in_another_order() {
+        let frame = dump(Content::Page).frame();
         let with = |change: &dyn Fn(&mut Vec<Rgb6>)| {
-            let mut other = picture.clone();
+            let mut other = frame.clone();
             change(&mut other.palette);
-            let subject = Subject::Picture(picture.clone());
-            compare(&subject, &Subject::Picture(other))
+            let subject = Subject::Png(frame.clone());
+            compare(&subject, &Subject::Png(other))
         };
         let error = with(&|palette| palette.swap(3, 200)).unwrap_err();
         assert_eq!(

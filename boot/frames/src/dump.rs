@@ -9,7 +9,7 @@ use std::io::{self, Write};
 
 use modex::Palette;
 use protocol::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
-use protocol::{Content, Lines, Motion, Picture, Word};
+use protocol::{Content, FrameName, Lines, Motion, Word};
 
 use crate::indexed::Indexed;
 use system::quote::quoted;
@@ -60,7 +60,7 @@ impl Dump {
                 continue;
             };
             let text = line.map_err(|noise| noise.to_string()).and_then(|line| {
-                match protocol::unframe(line) {
+                match protocol::without_checksum(line) {
                     Ok(text) => Ok(text.to_string()),
                     Err(error) => Err(error.to_string()),
                 }
@@ -159,7 +159,7 @@ impl Dump {
     }
 
     /// Returns the frame on the screen.
-    pub fn picture(&self) -> Indexed {
+    pub fn frame(&self) -> Indexed {
         let Header {
             width,
             height,
@@ -270,14 +270,19 @@ impl<'a> Reader<'a> {
         };
         let scene = self.line("scene")?;
         let scene = Word::new(scene).ok_or_else(|| format!("{} is no scene", quoted(scene)))?;
-        let pack = match self.line("pack")? {
+        // Version 5 renamed two lines.
+        let (model, frame) = match version {
+            ..5 => ("pack", "picture"),
+            _ => ("model", "frame"),
+        };
+        let model_file = match self.line(model)? {
             "none" => None,
             digits => {
                 let mut checksum = Vec::new();
                 hex(digits, &mut checksum)?;
                 let checksum: [u8; 4] = checksum
                     .try_into()
-                    .map_err(|_| "a pack's checksum has eight digits")?;
+                    .map_err(|_| "a model file's checksum has eight digits")?;
                 Some(u32::from_be_bytes(checksum))
             }
         };
@@ -285,15 +290,15 @@ impl<'a> Reader<'a> {
             "none" => None,
             name => Some(Word::new(name).ok_or_else(|| format!("{} is no mapper", quoted(name)))?),
         };
-        let picture = match self.line("picture")? {
+        let frame = match self.line(frame)? {
             "none" => None,
             name => Some(
-                Picture::parse(name.split(' '))
-                    .ok_or_else(|| format!("{} is no picture", quoted(name)))?,
+                FrameName::parse(name.split(' '))
+                    .ok_or_else(|| format!("{} is no frame", quoted(name)))?,
             ),
         };
         // Version 3 named a mapper before the first frame, and had no line `motion`.
-        let mapper = mapper.filter(|_| picture.is_some());
+        let mapper = mapper.filter(|_| frame.is_some());
         let motion = match version {
             ..4 => None,
             _ => match self.line("motion")? {
@@ -326,9 +331,9 @@ impl<'a> Reader<'a> {
         Ok(Header {
             content,
             scene: scene.to_string(),
-            pack,
+            model_file,
             mapper,
-            picture,
+            frame,
             motion,
             start: u16::from_be_bytes(start),
             width,
@@ -390,9 +395,9 @@ mod tests {
             header: Header {
                 content: Content::Page,
                 scene: "cube".into(),
-                pack: None,
+                model_file: None,
                 mapper: Word::new("exact"),
-                picture: Some(Picture::Frame(7)),
+                frame: Some(FrameName::Number(7)),
                 motion: Some(Motion {
                     yaw: 1,
                     pitch: u32::MAX,
@@ -420,38 +425,59 @@ mod tests {
     }
 
     #[test]
-    fn a_header_comes_back_with_its_motion_and_without_a_picture() {
+    fn a_header_comes_back_with_its_motion_and_without_a_frame() {
         let mut dump = dump();
         assert_eq!(
             dump.lines()[4..7],
             [
                 "mapper exact",
-                "picture 7",
+                "frame 7",
                 "motion 00000001 ffffffff 00000000 ffff0000"
             ]
         );
         assert_eq!(Dump::from_lines(&dump.lines()).unwrap(), dump);
         let header = &mut dump.header;
-        (header.mapper, header.picture, header.motion) = (None, None, None);
+        (header.mapper, header.frame, header.motion) = (None, None, None);
         assert_eq!(
             dump.lines()[4..7],
-            ["mapper none", "picture none", "motion none"]
+            ["mapper none", "frame none", "motion none"]
         );
         assert_eq!(Dump::from_lines(&dump.lines()).unwrap(), dump);
+    }
+
+    /// Returns the lines with the words of versions 3 and 4.
+    fn old_words(lines: Vec<String>) -> Vec<String> {
+        let old = |line: String| match line.split_once(' ') {
+            Some(("model", checksum)) => format!("pack {checksum}"),
+            Some(("frame", name)) => format!("picture {name}"),
+            _ => line,
+        };
+        lines.into_iter().map(old).collect()
+    }
+
+    #[test]
+    fn version_4_is_read_with_its_own_words() {
+        let mut lines = old_words(dump().lines());
+        lines[0] = format!("{MAGIC} 4");
+        assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), dump());
+        lines[0] = format!("{MAGIC} 5");
+        let error = Dump::from_lines(&ended(lines)).unwrap_err();
+        assert_eq!(error.line, 4);
+        assert!(error.why.contains("'model' should"), "{error}");
     }
 
     #[test]
     fn version_3_is_read_as_a_dump_without_motion() {
         let mut old = dump();
         old.header.motion = None;
-        let mut lines = old.lines();
+        let mut lines = old_words(old.lines());
         lines[0] = format!("{MAGIC} 3");
         assert_eq!(lines.remove(6), "motion none");
         assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), old);
         // Version 3 named a mapper even before the first frame.
         lines[5] = "picture none".into();
         let header = Dump::from_lines(&ended(lines.clone())).unwrap().header;
-        assert_eq!((header.mapper, header.picture), (None, None));
+        assert_eq!((header.mapper, header.frame), (None, None));
         lines[0] = format!("{MAGIC} 4");
         let error = Dump::from_lines(&ended(lines)).unwrap_err();
         assert_eq!(error.line, 7);
@@ -461,8 +487,8 @@ mod tests {
     #[test]
     fn other_versions_and_motions_are_refused_by_line() {
         for (at, line, why) in [
-            (0, "crystal-ball dump 2", "reads versions 3 to 4"),
-            (0, "crystal-ball dump 5", "reads versions 3 to 4"),
+            (0, "crystal-ball dump 2", "reads versions 3 to 5"),
+            (0, "crystal-ball dump 6", "reads versions 3 to 5"),
             (0, "crystal-ball dump four", "version 'four'"),
             (6, "motion 1 2 3", "it has four hex numbers"),
             (6, "motion 1 2 3 -4", "it has four hex numbers"),

@@ -35,7 +35,7 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use protocol::{Command, Content, Picture};
+use protocol::{Command, Content, FrameName};
 use scene::catalogue::Entry;
 use serde::Deserialize;
 use texmap::{Mapper, Order};
@@ -58,7 +58,7 @@ pub struct Golden {
     /// Why the golden exists.
     pub about: String,
     /// The frames to show after `hold`; the golden is the last.
-    pub show: Vec<Picture>,
+    pub show: Vec<FrameName>,
     /// The options to draw with.
     pub look: Look,
     /// The path of the golden's PNG.
@@ -117,13 +117,11 @@ impl Golden {
         let description: Description = toml::from_str(&text)
             .map_err(|error| syntax(&text, &error))
             .with_context(wrong)?;
-        let pictures = description.show.iter().map(|name| {
-            Picture::parse(name.split(' '))
-                .with_context(|| format!("{} is no picture", quoted(name)))
+        let frames = description.show.iter().map(|name| {
+            FrameName::parse(name.split(' '))
+                .with_context(|| format!("{} is no frame", quoted(name)))
         });
-        let show = pictures
-            .collect::<Result<Vec<_>, _>>()
-            .with_context(wrong)?;
+        let show = frames.collect::<Result<Vec<_>, _>>().with_context(wrong)?;
         if show.is_empty() {
             return Err(anyhow::anyhow!("it shows nothing")).with_context(wrong);
         }
@@ -153,7 +151,7 @@ impl Golden {
     ///
     /// # Errors
     /// A file that cannot be read or is not an indexed PNG.
-    pub fn picture(&self) -> anyhow::Result<Option<Indexed>> {
+    pub fn frame(&self) -> anyhow::Result<Option<Indexed>> {
         let wrong = || format!("{} is no golden", self.png.display());
         match File::open(&self.png) {
             Ok(file) => Ok(Some(
@@ -229,12 +227,12 @@ impl Findings {
     ) -> anyhow::Result<()> {
         emulated.show_as(&golden.look, &golden.show)?;
         let drawn = Subject::Dump(emulated.dump(Content::Page)?);
-        match golden.picture() {
-            Ok(Some(picture)) => {
+        match golden.frame() {
+            Ok(Some(frame)) => {
                 self.compare(
                     golden,
                     "the emulated card and the golden",
-                    &Subject::Picture(picture),
+                    &Subject::Png(frame),
                     &drawn,
                 );
             }
@@ -446,11 +444,11 @@ pub fn bless<C: Card>(
         emulated.show_as(&golden.look, &golden.show)?;
         let drawn = emulated.dump(Content::Page)?;
         // A PNG that cannot be read is blessed again, like a missing PNG.
-        let before = golden.picture().unwrap_or_default();
+        let before = golden.frame().unwrap_or_default();
         match before {
-            Some(before) if before == drawn.picture() => continue,
+            Some(before) if before == drawn.frame() => continue,
             Some(before) => {
-                let expected = Subject::Picture(before);
+                let expected = Subject::Png(before);
                 differ.compare(&golden, "changes", &expected, &Subject::Dump(drawn.clone()));
                 if let Some(finding) = differ.found.last() {
                     say(&finding.to_string());
@@ -458,7 +456,7 @@ pub fn bless<C: Card>(
             }
             None => say(&format!("{}: is new: {}", golden.name, golden.about)),
         }
-        changes.push((golden, drawn.picture()));
+        changes.push((golden, drawn.frame()));
     }
     if changes.is_empty() {
         return Ok(0);
@@ -479,8 +477,8 @@ pub fn bless<C: Card>(
     disagree
         .verdict(&report.with_file_name("disagreement").join("report.html"))
         .context("QEMU does not agree, so nothing was blessed")?;
-    for (golden, picture) in &changes {
-        write_atomically(&golden.png, |file| picture.write_png(file))?;
+    for (golden, frame) in &changes {
+        write_atomically(&golden.png, |file| frame.write_png(file))?;
     }
     Ok(changes.len())
 }

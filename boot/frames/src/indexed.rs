@@ -22,7 +22,7 @@ pub struct Indexed {
 
 impl fmt::Debug for Indexed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "a picture of {} x {}", self.width, self.height)
+        write!(f, "a frame of {} x {}", self.width, self.height)
     }
 }
 

@@ -22,7 +22,7 @@ pub struct Look {
     pub mapper: Option<Mapper>,
     /// The order in which the columns of a frame are drawn, and the destination.
     #[arg(long, global = true, value_name = "NAME",
-        help = with_default("In which order the columns of a picture are drawn, and where to", name_of(Order::default())))]
+        help = with_default("In which order the columns of a frame are drawn, and where to", name_of(Order::default())))]
     pub order: Option<Named<Order>>,
 }
 

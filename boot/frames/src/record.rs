@@ -14,7 +14,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
-use protocol::{Command, Content, Picture, TICKS_PER_SECOND};
+use protocol::{Command, Content, FrameName, TICKS_PER_SECOND};
 
 use crate::card::{Card, Emulated};
 use crate::indexed::Indexed;
@@ -51,8 +51,8 @@ impl Options {
     pub fn check(&self) -> anyhow::Result<()> {
         match self.is_gif()? {
             true if centiseconds(self.every.into()) < SHORTEST => bail!(
-                "--every {}: the pictures of a GIF are shown {SHORTEST}/100 s at least, two frames \
-                 are as long; a folder of PNGs takes each",
+                "--every {}: a GIF shows each frame for at least {SHORTEST}/100 s, which is the time \
+                 of two; record a folder of PNGs, or every second frame",
                 self.every
             ),
             _ => Ok(()),
@@ -87,29 +87,29 @@ impl Options {
         look: &Look,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
     ) -> anyhow::Result<()> {
-        let frames = self.frames.clone().step_by(self.every as usize);
+        let numbers = self.frames.clone().step_by(self.every as usize);
         let what = format_args!("recording into {}", self.out.display());
-        let mut step = Step::counting(what, frames.clone().count() as u64);
+        let mut step = Step::counting(what, numbers.clone().count() as u64);
         machine.show_as(look, &[])?;
         emulated.show_as(look, &[])?;
-        let mut pictures = (1..).zip(frames).map(|(done, frame)| {
+        let mut frames = (1..).zip(numbers).map(|(done, number)| {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            let picture = seen(machine, emulated, Picture::Frame(frame))?;
+            let frame = seen(machine, emulated, FrameName::Number(number))?;
             step.at(done);
-            Ok((frame, picture))
+            Ok((number, frame))
         });
         if self.is_gif()? {
-            write_atomically(&self.out, |file| self.write_gif(file, pictures))?;
+            write_atomically(&self.out, |file| self.write_gif(file, frames))?;
             return Ok(wrote(&self.out)?);
         }
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("{} cannot be made", self.out.display()))?;
-        pictures.try_for_each(|recorded| {
-            let (frame, picture) = recorded?;
-            let png = self.out.join(format!("frame-{frame:06}.png"));
-            write_atomically(&png, |file| picture.write_png(file))?;
+        frames.try_for_each(|recorded| {
+            let (number, frame) = recorded?;
+            let png = self.out.join(format!("frame-{number:06}.png"));
+            write_atomically(&png, |file| frame.write_png(file))?;
             Ok(wrote(&png)?)
         })
     }
@@ -117,26 +117,26 @@ impl Options {
     fn write_gif(
         &self,
         file: &mut File,
-        pictures: impl Iterator<Item = anyhow::Result<(u32, Indexed)>>,
+        frames: impl Iterator<Item = anyhow::Result<(u32, Indexed)>>,
     ) -> anyhow::Result<()> {
         let mut to = BufWriter::new(file);
-        let mut pictures = pictures.peekable();
-        let Some(Ok((_, first))) = pictures.peek() else {
+        let mut frames = frames.peekable();
+        let Some(Ok((_, first))) = frames.peek() else {
             // There is no frame, or the first frame failed: no GIF to write.
-            return pictures.next().map_or(Ok(()), |failed| failed.map(|_| ()));
+            return frames.next().map_or(Ok(()), |failed| failed.map(|_| ()));
         };
         let mut gif = encoder(&mut to, first)?;
         let mut before = None;
-        for (i, recorded) in (0..).zip(pictures) {
-            let (_, picture) = recorded?;
+        for (i, recorded) in (0..).zip(frames) {
+            let (_, frame) = recorded?;
             // Each delay is the difference of two rounded times, so rounding errors do not add up.
             let every = u64::from(self.every);
             let delay = centiseconds((i + 1) * every) - centiseconds(i * every);
             gif.write_frame(&Frame {
                 delay: delay as u16,
-                ..changed(before.as_ref(), &picture)?
+                ..changed(before.as_ref(), &frame)?
             })?;
-            before = Some(picture);
+            before = Some(frame);
         }
         drop(gif);
         Ok(to.flush()?)
@@ -148,31 +148,31 @@ fn centiseconds(ticks: u64) -> u64 {
     ticks * 100 / u64::from(TICKS_PER_SECOND)
 }
 
-/// Shows `picture` on both VGAs, and returns the frame that QEMU's VGA holds.
+/// Shows `frame` on both VGAs, and returns the frame that QEMU's VGA holds.
 fn seen(
     machine: &mut impl Card,
     emulated: &mut Emulated<'_>,
-    picture: Picture,
+    frame: FrameName,
 ) -> anyhow::Result<Indexed> {
-    emulated.ask(Command::Show(picture))?;
-    machine.ask(Command::Show(picture))?;
+    emulated.ask(Command::Show(frame))?;
+    machine.ask(Command::Show(frame))?;
     let dump = emulated.dump(Content::Page)?;
     let sums = machine.ask(Command::Checksums(Content::Page))?;
     Ok(match sums == dump.checksums() {
-        true => dump.picture(),
-        false => machine.dump(Content::Page)?.picture(),
+        true => dump.frame(),
+        false => machine.dump(Content::Page)?.frame(),
     })
 }
 
-/// Returns an encoder for a GIF that has the size and the palette of `picture` and repeats for ever.
-fn encoder<W: Write>(to: W, picture: &Indexed) -> anyhow::Result<Encoder<W>> {
-    let colours: Vec<u8> = picture
+/// Returns an encoder for a GIF that has the size and the palette of `frame` and repeats for ever.
+fn encoder<W: Write>(to: W, frame: &Indexed) -> anyhow::Result<Encoder<W>> {
+    let colours: Vec<u8> = frame
         .palette
         .iter()
         .flatten()
         .map(|&part| widen(part))
         .collect();
-    let (width, height) = (picture.width.try_into()?, picture.height.try_into()?);
+    let (width, height) = (frame.width.try_into()?, frame.height.try_into()?);
     let mut encoder = Encoder::new(to, width, height, &colours)?;
     encoder.set_repeat(Repeat::Infinite)?;
     Ok(encoder)
@@ -233,7 +233,7 @@ mod tests {
             options(every, out).check().unwrap();
         }
         for (every, out, why) in [
-            (1, "a.gif", "--every 1: the pictures of a GIF"),
+            (1, "a.gif", "--every 1: a GIF shows each frame for"),
             (
                 3,
                 "a.mp4",
@@ -246,27 +246,27 @@ mod tests {
     }
 
     #[test]
-    fn a_gif_is_the_pictures_and_lasts_as_long() {
+    fn a_gif_is_the_frames_and_lasts_as_long() {
         let mut random = seeded::generator();
         let palette: Vec<_> = (0..=255u8).map(|i| [i / 4, i % 64, i / 8]).collect();
-        let mut picture = Indexed {
+        let mut frame = Indexed {
             width: 20,
             height: 14,
             palette,
             pixels: vec![7; 280],
         };
-        let mut pictures = vec![picture.clone(), picture.clone()];
+        let mut frames = vec![frame.clone(), frame.clone()];
         for _ in 0..50 {
             for _ in 0..random.usize(..30) {
-                picture.pixels[random.usize(..280)] = random.u8(..);
+                frame.pixels[random.usize(..280)] = random.u8(..);
             }
-            pictures.push(picture.clone());
+            frames.push(frame.clone());
         }
         // A frame in which every pixel changes and all 256 indices occur leaves no index for transparency.
-        picture.pixels = (0..280).map(|i| (i + i / 256) as u8).collect();
-        pictures.push(picture);
+        frame.pixels = (0..280).map(|i| (i + i / 256) as u8).collect();
+        frames.push(frame);
         let mut file = tempfile::tempfile().unwrap();
-        let recorded = pictures.iter().cloned().map(|picture| Ok((0, picture)));
+        let recorded = frames.iter().cloned().map(|frame| Ok((0, frame)));
         options(2, "a.gif").write_gif(&mut file, recorded).unwrap();
 
         std::io::Seek::rewind(&mut file).unwrap();
@@ -276,7 +276,7 @@ mod tests {
         assert_eq!(decoder.repeat(), Repeat::Infinite);
         let mut shown = vec![0; 280];
         let mut time = 0;
-        for picture in &pictures {
+        for expected in &frames {
             let frame = decoder.read_next_frame().unwrap().unwrap();
             for (i, &pixel) in frame.buffer.iter().enumerate() {
                 let (x, y) = (i % usize::from(frame.width), i / usize::from(frame.width));
@@ -285,11 +285,11 @@ mod tests {
                     shown[place] = pixel;
                 }
             }
-            assert_eq!(shown, picture.pixels);
+            assert_eq!(shown, expected.pixels);
             assert!((3..=4).contains(&frame.delay), "{}", frame.delay);
             time += frame.delay;
         }
         assert!(decoder.read_next_frame().unwrap().is_none());
-        assert_eq!(u64::from(time), centiseconds(2 * pictures.len() as u64));
+        assert_eq!(u64::from(time), centiseconds(2 * frames.len() as u64));
     }
 }

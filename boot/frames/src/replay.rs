@@ -62,25 +62,25 @@ impl Options {
             bail!("standard output is no terminal to play in; --sheet FILE.png makes a sheet");
         }
         let files = self.files()?;
-        let mut pictures = Vec::new();
+        let mut frames = Vec::new();
         let mut step = Step::counting("reading", files.len() as u64);
         for (done, file) in (1..).zip(&files) {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            pictures.push(Subject::read(file)?.picture().into_owned());
+            frames.push(Subject::read(file)?.frame().into_owned());
             step.at(done);
         }
         drop(step);
         match &self.sheet {
             Some(sheet) => {
-                let laid_out = lay_out(&pictures, &names(&files));
+                let laid_out = lay_out(&frames, &names(&files));
                 write_atomically(sheet, |file| {
                     laid_out.write_png(std::io::BufWriter::new(file))
                 })?;
                 Ok(wrote(sheet)?)
             }
-            None => self.play(&pictures),
+            None => self.play(&frames),
         }
     }
 
@@ -93,9 +93,9 @@ impl Options {
                 continue;
             }
             let names = list(path).with_context(|| format!("{} cannot be read", path.display()))?;
-            let pictures = names.iter().map(|name| path.join(name));
+            let frames = names.iter().map(|name| path.join(name));
             // A dump and a PNG of the same name are the same frame.
-            files.extend(pictures.filter(|file| {
+            files.extend(frames.filter(|file| {
                 let dump = file.with_extension("dump");
                 file == &dump || !names.contains(dump.file_name().unwrap_or_default())
             }));
@@ -106,15 +106,15 @@ impl Options {
         Ok(files)
     }
 
-    fn play(&self, pictures: &[Indexed]) -> anyhow::Result<()> {
+    fn play(&self, frames: &[Indexed]) -> anyhow::Result<()> {
         let screen = Alternate::enter()?;
         let time = Duration::from_secs(1) / self.rate;
         let mut due = Instant::now();
         loop {
-            for (i, picture) in (1..).zip(pictures) {
+            for (i, frame) in (1..).zip(frames) {
                 let (rows, columns) = Term::stdout().size();
-                let mut text = in_blocks(picture, columns.into(), rows.saturating_sub(1).into());
-                let count = pictures.len();
+                let mut text = in_blocks(frame, columns.into(), rows.saturating_sub(1).into());
+                let count = frames.len();
                 let _ = write!(text, "{RESET}{ERASE}{i} of {count}; Ctrl-C ends it");
                 screen.write(&text)?;
                 due += time;
@@ -159,12 +159,12 @@ impl Drop for Alternate {
 }
 
 /// Returns a pixel's colour, 8 bits per component.
-fn colour(picture: &Indexed, x: usize, y: usize) -> [u8; 3] {
-    picture.palette[usize::from(picture.pixels[y * picture.width + x])].map(widen)
+fn colour(frame: &Indexed, x: usize, y: usize) -> [u8; 3] {
+    frame.palette[usize::from(frame.pixels[y * frame.width + x])].map(widen)
 }
 
 /// Shrinks a frame to `width` x `height`. Each pixel is the mean of the pixels that it replaces.
-fn shrunk(picture: &Indexed, width: usize, height: usize) -> Screen {
+fn shrunk(frame: &Indexed, width: usize, height: usize) -> Screen {
     let mut pixels = Vec::with_capacity(width * height);
     for j in 0..height {
         for i in 0..width {
@@ -172,15 +172,12 @@ fn shrunk(picture: &Indexed, width: usize, height: usize) -> Screen {
                 let first = at * all / of;
                 first..((at + 1) * all / of).max(first + 1)
             };
-            let (xs, ys) = (
-                range(i, width, picture.width),
-                range(j, height, picture.height),
-            );
+            let (xs, ys) = (range(i, width, frame.width), range(j, height, frame.height));
             let count = (xs.len() * ys.len()) as u32;
             let mut sum = [0u32; 3];
             for y in ys {
                 for x in xs.clone() {
-                    for (sum, part) in sum.iter_mut().zip(colour(picture, x, y)) {
+                    for (sum, part) in sum.iter_mut().zip(colour(frame, x, y)) {
                         *sum += u32::from(part);
                     }
                 }
@@ -196,15 +193,15 @@ fn shrunk(picture: &Indexed, width: usize, height: usize) -> Screen {
 }
 
 /// Returns a frame as half-block characters, two pixels each, as large as fits.
-fn in_blocks(picture: &Indexed, columns: usize, rows: usize) -> String {
+fn in_blocks(frame: &Indexed, columns: usize, rows: usize) -> String {
     let (columns, rows) = (columns.max(1), rows.max(1));
     // A terminal's character is about twice as high as wide, so its two halves are about square.
     let width = columns
-        .min(picture.width)
-        .min(2 * rows * picture.width / picture.height)
+        .min(frame.width)
+        .min(2 * rows * frame.width / frame.height)
         .max(1);
-    let height = (width * picture.height / picture.width).max(2) & !1;
-    let small = shrunk(picture, width, height);
+    let height = (width * frame.height / frame.width).max(2) & !1;
+    let small = shrunk(frame, width, height);
     let mut text = String::from(HOME);
     for pair in small.pixels.chunks_exact(2 * width) {
         let (upper, lower) = pair.split_at(width);
@@ -266,14 +263,14 @@ fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) 
 }
 
 /// Returns a sheet of all frames, row by row, with their names below.
-fn lay_out(pictures: &[Indexed], names: &[String]) -> Screen {
-    let across = (1..).find(|n| n * n >= pictures.len()).unwrap_or(1);
-    let most = |of: fn(&Indexed) -> usize| pictures.iter().map(of).max().unwrap_or(1);
+fn lay_out(frames: &[Indexed], names: &[String]) -> Screen {
+    let across = (1..).find(|n| n * n >= frames.len()).unwrap_or(1);
+    let most = |of: fn(&Indexed) -> usize| frames.iter().map(of).max().unwrap_or(1);
     let (wide, high) = (most(|p| p.width), most(|p| p.height));
     // Full size, if it fits.
     let cell_width = wide.min((SHEET_WIDTH / across).saturating_sub(GAP)).max(1);
     let cell_height = (high * cell_width / wide).max(1);
-    let down = pictures.len().div_ceil(across);
+    let down = frames.len().div_ceil(across);
     let scale = (cell_width / PER_SCALE).max(1);
     let pitch = cell_height + LINE * scale + GAP;
     let mut sheet = Screen {
@@ -282,10 +279,10 @@ fn lay_out(pictures: &[Indexed], names: &[String]) -> Screen {
         pixels: Vec::new(),
     };
     sheet.pixels = vec![GROUND; sheet.width * sheet.height];
-    for (i, (picture, name)) in pictures.iter().zip(names).enumerate() {
-        let width = (picture.width * cell_width / wide).max(1);
-        let height = (picture.height * cell_width / wide).max(1);
-        let small = shrunk(picture, width, height);
+    for (i, (frame, name)) in frames.iter().zip(names).enumerate() {
+        let width = (frame.width * cell_width / wide).max(1);
+        let height = (frame.height * cell_width / wide).max(1);
+        let small = shrunk(frame, width, height);
         let left = GAP + i % across * (cell_width + GAP);
         let top = GAP + i / across * pitch;
         for (y, row) in (top..).zip(small.pixels.chunks_exact(width)) {
@@ -315,19 +312,19 @@ mod tests {
     }
 
     #[test]
-    fn a_smaller_picture_has_the_mean_of_what_it_leaves_out() {
-        let picture = halves(320, 240);
-        assert_eq!(shrunk(&picture, 320, 240).pixels[160], [255; 3]);
-        let third = shrunk(&picture, 3, 2).pixels;
+    fn a_smaller_frame_has_the_mean_of_what_it_leaves_out() {
+        let frame = halves(320, 240);
+        assert_eq!(shrunk(&frame, 320, 240).pixels[160], [255; 3]);
+        let third = shrunk(&frame, 3, 2).pixels;
         assert_eq!([third[0][0], third[2][0]], [0, 255]);
         assert!((120..=135).contains(&third[1][0]), "{third:?}");
     }
 
     #[test]
-    fn a_sheet_has_every_picture_in_its_place() {
-        let pictures = vec![halves(320, 240); 5];
+    fn a_sheet_has_every_frame_in_its_place() {
+        let frames = vec![halves(320, 240); 5];
         let names: Vec<_> = (0..5).map(|i| format!("frame-{i:06}")).collect();
-        let sheet = lay_out(&pictures, &names);
+        let sheet = lay_out(&frames, &names);
         assert_eq!((sheet.width, sheet.height), (3 * 324 + 4, 2 * 264 + 4));
         let white = sheet.pixels.iter().filter(|&&pixel| pixel == [255; 3]);
         assert_eq!(white.count(), 5 * 160 * 240);
@@ -335,8 +332,8 @@ mod tests {
         let letters_below = |i: usize| {
             let rows = sheet.pixels.chunks_exact(sheet.width);
             let below = rows.skip(4 + i / 3 * 264 + 240).take(20);
-            let of_picture = below.flat_map(|row| &row[4 + i % 3 * 324..][..320]);
-            of_picture.filter(|&&pixel| pixel == NAMES).count()
+            let of_frame = below.flat_map(|row| &row[4 + i % 3 * 324..][..320]);
+            of_frame.filter(|&&pixel| pixel == NAMES).count()
         };
         let counts: Vec<_> = (0..6).map(letters_below).collect();
         assert!(counts[..5].iter().all(|&count| count > 400), "{counts:?}");

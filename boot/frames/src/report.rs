@@ -263,7 +263,7 @@ struct View {
 
 impl Pair {
     fn views(&self) -> Vec<View> {
-        let (expected, got) = (self.expected.picture(), self.got.picture());
+        let (expected, got) = (self.expected.frame(), self.got.frame());
         let page = View {
             suffix: "",
             title: None,
@@ -379,7 +379,7 @@ impl Pair {
                 (Shape { width, memory }, &a.pixels[..], &b.pixels[..])
             }
             (a, b) => {
-                (expected, got) = (a.picture(), b.picture());
+                (expected, got) = (a.frame(), b.frame());
                 let width = expected.width;
                 let shape = Shape {
                     width,
@@ -560,14 +560,14 @@ fn whole(dump: &Dump) -> Indexed {
 fn palette(subject: &Subject) -> &[Rgb6] {
     match subject {
         Subject::Dump(dump) => &dump.palette,
-        Subject::Picture(picture) => &picture.palette,
+        Subject::Png(frame) => &frame.palette,
     }
 }
 
 /// Returns the expected frame in dim grey, with the differing pixels in bright colours.
 fn difference(expected: &Indexed, got: &Indexed) -> Screen {
-    let colour = |picture: &Indexed, index: u8| {
-        let colour = picture.palette.get(usize::from(index));
+    let colour = |frame: &Indexed, index: u8| {
+        let colour = frame.palette.get(usize::from(index));
         colour.copied().unwrap_or_default()
     };
     let pairs = expected.pixels.iter().zip(&got.pixels);
@@ -687,7 +687,7 @@ mod tests {
     use super::*;
     use crate::difference::compare;
 
-    fn picture(pixels: &[u8]) -> Indexed {
+    fn frame(pixels: &[u8]) -> Indexed {
         Indexed {
             width: 4,
             height: pixels.len() / 4,
@@ -698,8 +698,8 @@ mod tests {
 
     #[test]
     fn the_difference_shows_how_far_the_colours_are() {
-        let expected = picture(&[0, 0, 1, 1]);
-        let mut got = picture(&[1, 3, 2, 1]);
+        let expected = frame(&[0, 0, 1, 1]);
+        let mut got = frame(&[1, 3, 2, 1]);
         let pixels = |got: &Indexed| difference(&expected, got).pixels;
         let [far, near, same, equal] = pixels(&got)[..] else {
             panic!()
@@ -729,8 +729,8 @@ mod tests {
     fn names_are_harmless_wherever_they_stand() {
         let folder = tempfile::tempdir().unwrap();
         let html = folder.path().join("a b%#é.html");
-        let (expected, got) = (picture(&[0; 8]), picture(&[1; 8]));
-        let [expected, got] = [expected, got].map(Subject::Picture);
+        let (expected, got) = (frame(&[0; 8]), frame(&[1; 8]));
+        let [expected, got] = [expected, got].map(Subject::Png);
         let difference = compare(&expected, &got).unwrap().unwrap();
         let mut report = Report::new();
         for name in ["../<b>&\"'/x", "../<B>&\"'/x", "", &"long ".repeat(99)] {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::{ArgAction, Args};
-use protocol::{Command, Content, Motion, Picture};
+use protocol::{Command, Content, FrameName, Motion};
 
 use crate::card::Card;
 use crate::look::Look;
@@ -78,7 +78,7 @@ pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
 
 impl Frames {
     /// Returns the number of frames, and the frames.
-    fn pictures(&self) -> (u64, impl Iterator<Item = Picture>) {
+    fn frames(&self) -> (u64, impl Iterator<Item = FrameName>) {
         let Which {
             single,
             ranges,
@@ -87,7 +87,7 @@ impl Frames {
         let (poses, _) = pose.as_chunks::<4>();
         let numbers = single.iter().copied();
         let frames = numbers.chain(ranges.iter().cloned().flatten());
-        let poses_of = |&[yaw, pitch, roll, distance]: &[u32; 4]| Picture::Pose {
+        let poses_of = |&[yaw, pitch, roll, distance]: &[u32; 4]| FrameName::Pose {
             yaw,
             pitch,
             roll,
@@ -98,8 +98,10 @@ impl Frames {
             .map(|range| u64::from(range.end() - range.start()) + 1)
             .sum();
         let count = (single.len() + poses.len()) as u64 + in_ranges;
-        let pictures = frames.map(Picture::Frame).chain(poses.iter().map(poses_of));
-        (count, pictures)
+        let frames = frames
+            .map(FrameName::Number)
+            .chain(poses.iter().map(poses_of));
+        (count, frames)
     }
 
     /// Returns the motion, if the user named one.
@@ -133,24 +135,24 @@ impl Frames {
             false => Content::Page,
         };
         let motion = self.motion();
-        let (count, pictures) = self.pictures();
+        let (count, frames) = self.frames();
         let what = format_args!("dumping into {}", self.out.display());
         let mut step = Step::counting(what, count);
-        for (done, picture) in (1..).zip(pictures) {
+        for (done, frame) in (1..).zip(frames) {
             if interrupted() {
                 return Err(Interrupted.into());
             }
             card.show_as(look, &[])?;
             card.ask(match motion {
-                Some(motion) => Command::ShowMoving(picture, motion),
-                None => Command::Show(picture),
+                Some(motion) => Command::ShowMoving(frame, motion),
+                None => Command::Show(frame),
             })?;
             let dump = card.dump(content)?;
-            let stem = self.out.join(stem(picture, motion, content));
+            let stem = self.out.join(stem(frame, motion, content));
             let text = stem.with_added_extension("dump");
             write_atomically(&text, |file| Ok(dump.write(std::io::BufWriter::new(file))?))?;
             let png = stem.with_added_extension("png");
-            write_atomically(&png, |file| dump.picture().write_png(file))?;
+            write_atomically(&png, |file| dump.frame().write_png(file))?;
             step.at(done);
             wrote(&text)?;
             wrote(&png)?;
@@ -161,10 +163,10 @@ impl Frames {
 
 /// Returns the name of a frame's files, without an extension. Numbers are padded, so that a folder sorts by
 /// frame.
-fn stem(picture: Picture, motion: Option<Motion>, content: Content) -> String {
-    let mut name = match picture {
-        Picture::Frame(frame) => format!("frame-{frame:06}"),
-        Picture::Pose {
+fn stem(frame: FrameName, motion: Option<Motion>, content: Content) -> String {
+    let mut name = match frame {
+        FrameName::Number(frame) => format!("frame-{frame:06}"),
+        FrameName::Pose {
             yaw,
             pitch,
             roll,
@@ -199,7 +201,7 @@ mod tests {
             card.ask(Command::parse(line).unwrap()).unwrap();
         }
         let shown = card.dump(Content::Page).unwrap();
-        assert_eq!(shown.header.picture, Some(Picture::Frame(9)));
+        assert_eq!(shown.header.frame, Some(FrameName::Number(9)));
         let motion = shown.header.motion.expect("it is in reduced quality");
         let Motion {
             yaw,

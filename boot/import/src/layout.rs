@@ -25,7 +25,7 @@ const TEXEL: f64 = 65_536.0;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Window {
     /// The texels of the whole image, after scaling.
-    picture: u32,
+    image: u32,
     /// The first texel of the cut, relative to the start of the first image.
     first: i64,
     /// The number of texels of the cut, 1 to 256.
@@ -35,32 +35,32 @@ struct Window {
 impl Window {
     /// Returns the interval for coordinates from `low` to `high`, in whole images of `pixels` pixels.
     fn around(low: f64, high: f64, pixels: u32) -> Self {
-        let mut picture = pixels.min((256.0 / (high - low).max(1e-9)) as u32).max(1);
+        let mut image = pixels.min((256.0 / (high - low).max(1e-9)) as u32).max(1);
         loop {
-            let first = (low * f64::from(picture)).floor() as i64;
-            let end = (high * f64::from(picture)).ceil() as i64;
+            let first = (low * f64::from(image)).floor() as i64;
+            let end = (high * f64::from(image)).ceil() as i64;
             let texels = (end - first).max(1);
             // Rounded out to whole texels, the interval can be one texel too long.
-            if texels <= 256 || picture == 1 {
+            if texels <= 256 || image == 1 {
                 return Self {
-                    picture,
+                    image,
                     first,
                     texels: texels.min(256) as u16,
                 };
             }
-            picture -= 1;
+            image -= 1;
         }
     }
 
     /// Returns the position of a coordinate in the cut, 16.16.
     fn place(&self, coordinate: f64) -> i32 {
-        let texel = coordinate * f64::from(self.picture) - self.first as f64;
+        let texel = coordinate * f64::from(self.image) - self.first as f64;
         (texel.clamp(0.0, self.texels.into()) * TEXEL).round() as i32
     }
 
     /// Returns the pixel of the scaled image for a texel of the cut.
     fn pixel(&self, texel: u32) -> u32 {
-        (self.first + i64::from(texel)).rem_euclid(self.picture.into()) as u32
+        (self.first + i64::from(texel)).rem_euclid(self.image.into()) as u32
     }
 }
 
@@ -150,17 +150,17 @@ impl Layout {
 
     /// Returns the size to which the whole image is scaled, never larger than the image.
     pub fn scaled(&self) -> (u32, u32) {
-        (self.across.picture, self.down.picture)
+        (self.across.image, self.down.image)
     }
 
     /// Returns the texels of an image, row by row.
-    pub fn cut_scaled(&self, picture: &RgbImage) -> Vec<Rgb<u8>> {
+    pub fn cut_scaled(&self, image: &RgbImage) -> Vec<Rgb<u8>> {
         let (width, height) = self.scaled();
-        if picture.dimensions() == (width, height) {
-            return self.cut(|i, j| *picture.get_pixel(i, j));
+        if image.dimensions() == (width, height) {
+            return self.cut(|i, j| *image.get_pixel(i, j));
         }
-        let picture = resize(picture, width, height, FilterType::CatmullRom);
-        self.cut(|i, j| *picture.get_pixel(i, j))
+        let image = resize(image, width, height, FilterType::CatmullRom);
+        self.cut(|i, j| *image.get_pixel(i, j))
     }
 }
 
@@ -172,7 +172,7 @@ mod tests {
     use crate::texture::MAX_PIXELS;
 
     /// Returns the layout of triangles with these coordinates, and the positions of their corners in texels.
-    fn laid_out(triangles: &[[[f64; 2]; 3]], picture: (u32, u32)) -> (Layout, Vec<[f64; 2]>) {
+    fn laid_out(triangles: &[[[f64; 2]; 3]], image: (u32, u32)) -> (Layout, Vec<[f64; 2]>) {
         let mut text = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\n");
         for [u, v] in triangles.as_flattened() {
             text += &format!("vt {u} {v}\n");
@@ -183,7 +183,7 @@ mod tests {
             text += &format!("f 3/{c} 2/{b} 1/{a}\n");
         }
         let polygons = Polygons::new(&obj::parse(text.as_bytes()).unwrap()).unwrap();
-        let layout = Layout::new(&polygons.polygons, picture).unwrap();
+        let layout = Layout::new(&polygons.polygons, image).unwrap();
         let places = polygons
             .polygons
             .iter()
@@ -195,14 +195,14 @@ mod tests {
     const WHOLE: [[f64; 2]; 3] = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]];
 
     #[test]
-    fn a_small_picture_stays_as_it_is_and_a_large_one_is_scaled_to_fit() {
-        for (picture, size) in [
+    fn a_small_image_stays_as_it_is_and_a_large_one_is_scaled_to_fit() {
+        for (image, size) in [
             ((256, 256), (256, 256)),
             ((1, 7), (1, 7)),
             ((512, 100), (256, 100)),
             ((300, 8192), (256, 256)),
         ] {
-            let (layout, places) = laid_out(&[WHOLE], picture);
+            let (layout, places) = laid_out(&[WHOLE], image);
             assert_eq!(layout.size(), size);
             assert_eq!(layout.scaled(), (size.0.into(), size.1.into()));
             let (w, h) = (f64::from(size.0), f64::from(size.1));
@@ -249,14 +249,14 @@ mod tests {
             let pixels = random.u32(1..=MAX_PIXELS);
             let window = Window::around(low, high, pixels);
             assert!(
-                window.picture <= pixels && (1..=256).contains(&window.texels),
+                window.image <= pixels && (1..=256).contains(&window.texels),
                 "{case}"
             );
             for (place, border) in [(low, 0.0), (high, f64::from(window.texels))] {
-                let texel = place * f64::from(window.picture) - window.first as f64;
+                let texel = place * f64::from(window.image) - window.first as f64;
                 assert!((texel - border).abs() <= 1.0, "{case}: {window:?}");
             }
-            assert!(window.pixel(u32::from(window.texels) - 1) < window.picture);
+            assert!(window.pixel(u32::from(window.texels) - 1) < window.image);
         }
     }
 }

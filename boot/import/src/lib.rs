@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! OBJ -> polygons on the grid -> layout of the texture -> mesh   \
-//! PNG ------------------------> cut from the repeated picture     > pack -> ramdisk, emulated card
+//! PNG ------------------------> cut from the repeated image     > model file -> ramdisk, emulated card
 //!                               -> texels, palette, light table  /
 //! ```
 //!
@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
-use model::{Pack, Parts};
+use model::{ModelFile, Parts};
 use scene::Mesh;
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use system::quote;
@@ -37,7 +37,7 @@ use layout::Layout;
 use mesh::{Solid, Turned};
 use obj::{BadLine, Obj};
 use polygon::{Polygons, Tally};
-use texture::Picture;
+use texture::Image;
 
 /// The maximum size of an OBJ in bytes: far more than a model of [`scene::MAX_FACES`] faces has.
 const MAX_BYTES: u64 = 64 << 20;
@@ -110,15 +110,15 @@ impl Model {
 
     fn load_files(obj: &Path, png: Option<&Path>) -> anyhow::Result<Self> {
         let bytes = read_obj(obj).with_context(|| quote::path(obj))?;
-        let picture = match png {
+        let image = match png {
             Some(png) => {
                 let file = File::open(png).context("it cannot be read");
-                let picture = file.and_then(|file| texture::read(BufReader::new(file)));
-                Some(picture.with_context(|| quote::path(png))?)
+                let image = file.and_then(|file| texture::read(BufReader::new(file)));
+                Some(image.with_context(|| quote::path(png))?)
             }
             None => None,
         };
-        Self::new(&bytes, picture.as_ref()).map_err(|error| {
+        Self::new(&bytes, image.as_ref()).map_err(|error| {
             let name = quote::path(obj);
             match error.downcast::<BadLine>() {
                 Ok(BadLine { line, why }) => anyhow!("{name}:{line}: {why}"),
@@ -131,8 +131,8 @@ impl Model {
     ///
     /// # Errors
     /// As [`Files::load`], without the file's name.
-    pub fn new(obj: &[u8], picture: Option<&Picture>) -> anyhow::Result<Self> {
-        let pixels = picture.map(|picture| &picture.pixels);
+    pub fn new(obj: &[u8], image: Option<&Image>) -> anyhow::Result<Self> {
+        let pixels = image.map(|image| &image.pixels);
         let size = obj.len();
         let other = |error| match kind::name(obj, Some(size)) {
             Some(kind) => anyhow!(
@@ -194,16 +194,17 @@ impl Model {
         let mut bytes = Vec::new();
         parts.write(|part| bytes.extend_from_slice(part));
         // The kernel would refuse a wrong model file only seconds later, after the boot.
-        Pack::parse(&bytes).context("its pack is wrong, which is this program's fault")?;
+        ModelFile::parse(&bytes)
+            .context("its model file is wrong, which is this program's fault")?;
         Ok(Self {
-            about: about(&obj, &solid, (width, height), picture),
+            about: about(&obj, &solid, (width, height), image),
             bytes,
         })
     }
 
     /// Returns the model file.
-    pub fn pack(&self) -> Pack<'_> {
-        Pack::parse(&self.bytes).expect("it was read when it was made")
+    pub fn file(&self) -> ModelFile<'_> {
+        ModelFile::parse(&self.bytes).expect("it was read when it was made")
     }
 
     /// Returns how much longer the boot loader needs to read an image with this model, in seconds.
@@ -212,14 +213,14 @@ impl Model {
     }
 }
 
-/// Returns an OBJ's mesh, and the way to cut its texture from an image of `picture` pixels.
+/// Returns an OBJ's mesh, and the way to cut its texture from an image of `image` pixels.
 ///
 /// # Errors
 /// If no face can be drawn, if the mesh exceeds a limit of a model file, or if a face repeats the image too
 /// often.
-pub fn solid(obj: &Obj, picture: (u32, u32)) -> anyhow::Result<(Solid, Layout)> {
+pub fn solid(obj: &Obj, image: (u32, u32)) -> anyhow::Result<(Solid, Layout)> {
     let polygons = Polygons::new(obj)?;
-    let layout = Layout::new(&polygons.polygons, picture)?;
+    let layout = Layout::new(&polygons.polygons, image)?;
     Ok((Solid::new(polygons, &layout)?, layout))
 }
 
@@ -242,7 +243,7 @@ fn read_obj(path: &Path) -> anyhow::Result<Vec<u8>> {
 /// Returns what the user can do about a model of another format.
 fn remedy(kind: &str) -> &'static str {
     match kind {
-        "PNG" => "a picture goes behind --texture",
+        "PNG" => "a image goes behind --texture",
         kind if kind.ends_with("text") => "save it as UTF-8",
         kind if kind.contains("MTL") => "give the OBJ file that goes with it",
         _ => "export the model as an OBJ",
@@ -250,12 +251,7 @@ fn remedy(kind: &str) -> &'static str {
 }
 
 /// Returns the summary of the import: a line, and a note if the whole model faces the wrong way.
-fn about(
-    obj: &Obj,
-    solid: &Solid,
-    (width, height): (u16, u16),
-    picture: Option<&Picture>,
-) -> String {
+fn about(obj: &Obj, solid: &Solid, (width, height): (u16, u16), image: Option<&Image>) -> String {
     let Tally {
         degenerate,
         cut,
@@ -277,9 +273,9 @@ fn about(
     if obj.left_out.count > 0 {
         about += &format!(", {}", obj.left_out);
     }
-    let whose = if picture.is_some() { "" } else { " of our own" };
+    let whose = if image.is_some() { "" } else { " of our own" };
     about += &format!(", texture{whose} {width} x {height}");
-    if picture.is_some_and(|picture| picture.transparent) {
+    if image.is_some_and(|image| image.transparent) {
         about += ", transparent parts drawn over grey (808080)";
     }
     let turned = match solid.turned() {

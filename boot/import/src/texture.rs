@@ -19,7 +19,7 @@ pub const MAX_PIXELS: u32 = 8192;
 pub const GROUND: [u8; 3] = [128; 3];
 /// An opaque image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Picture {
+pub struct Image {
     /// The pixels, blended over [`GROUND`] where they are transparent.
     pub pixels: RgbImage,
     /// Whether a part of the image was transparent.
@@ -34,7 +34,7 @@ pub struct Picture {
 ///
 /// # Errors
 /// If the file has another format, which the message names, is damaged, or is larger than [`MAX_PIXELS`].
-pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
+pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Image> {
     let begin = from.fill_buf().context("it cannot be read")?;
     if !begin.starts_with(PNG) {
         match kind::name(begin, None) {
@@ -76,13 +76,13 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Picture> {
     let frame = reader.next_frame(&mut bytes).map_err(damaged)?;
     ensure!(
         frame.bit_depth == BitDepth::Eight && (frame.width, frame.height) == (width, height),
-        "its first picture is not of its header's size; save it again"
+        "its first image is not of its header's size; save it again"
     );
     Ok(over_ground(bytes, frame.color_type, (width, height)))
 }
 
 /// Blends a decoder's pixels, with 8 bits a component, over [`GROUND`].
-fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32)) -> Picture {
+fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32)) -> Image {
     let pixels = width as usize * height as usize;
     let samples = colour.samples();
     let mut transparent = false;
@@ -114,7 +114,7 @@ fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32
     }
     bytes.truncate(3 * pixels);
     let pixels = RgbImage::from_raw(width, height, bytes);
-    Picture {
+    Image {
         pixels: pixels.expect("three bytes a pixel"),
         transparent,
     }
@@ -145,9 +145,9 @@ mod tests {
         bytes
     }
 
-    fn picture(bytes: &[u8]) -> (Vec<u8>, bool) {
-        let picture = read(Cursor::new(bytes)).unwrap();
-        (picture.pixels.into_raw(), picture.transparent)
+    fn image(bytes: &[u8]) -> (Vec<u8>, bool) {
+        let image = read(Cursor::new(bytes)).unwrap();
+        (image.pixels.into_raw(), image.transparent)
     }
 
     #[test]
@@ -203,7 +203,7 @@ mod tests {
                 }
             });
             assert_eq!(
-                picture(&bytes),
+                image(&bytes),
                 (pixels.clone(), false),
                 "{colour:?} {depth:?}"
             );
@@ -217,7 +217,7 @@ mod tests {
         let at = |x: u8, y: u8| [x * 32, y * 32, (x ^ y) * 16];
         let all = (0..8).flat_map(|y| (0..8).map(move |x| at(x, y)));
         let all: Vec<_> = all.flatten().collect();
-        assert_eq!(picture(&interlaced), (all, false));
+        assert_eq!(image(&interlaced), (all, false));
         // Animated: the first image counts.
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 1, 1);
@@ -227,7 +227,7 @@ mod tests {
         writer.write_image_data(&[1, 2, 3]).unwrap();
         writer.write_image_data(&[7, 8, 9]).unwrap();
         writer.finish().unwrap();
-        assert_eq!(picture(&bytes), (vec![1, 2, 3], false));
+        assert_eq!(image(&bytes), (vec![1, 2, 3], false));
     }
 
     #[test]
@@ -302,7 +302,7 @@ mod tests {
                 }
             });
             assert_eq!(
-                picture(&bytes),
+                image(&bytes),
                 (pixels.clone(), true),
                 "{colour:?} {depth:?}"
             );

@@ -131,7 +131,7 @@ mod tests {
             image: "a,b.img".into(),
             vga: "std".into(),
             display: "none".into(),
-            pack: None,
+            model_file: None,
             arguments: arguments.iter().map(OsString::from).collect(),
             failures: "failures".into(),
             limits: Default::default(),

@@ -95,7 +95,7 @@ pub struct Config {
     pub display: String,
     /// The checksum of the model file that the kernel must accept. If it is `None`, the kernel may refuse the
     /// model file; its answer is kept either way ([`Machine::said_of_pack`]).
-    pub pack: Option<u32>,
+    pub model_file: Option<u32>,
     /// More arguments for QEMU.
     pub arguments: Vec<OsString>,
     /// The folder for evidence: each failure gets a new folder in it.
@@ -113,7 +113,7 @@ impl Config {
             image: ready.image.clone(),
             vga: "std".into(),
             display: "none".into(),
-            pack: None,
+            model_file: None,
             arguments: Vec::new(),
             failures: ready.image.with_file_name("failures"),
             limits: Limits::default(),
@@ -222,16 +222,16 @@ impl Machine {
                 return Err(machine.fail(Verdict::BootLoader { reset, found }));
             }
         }
-        if let Some(pack) = config.pack {
-            machine.wait_for_pack(pack)?;
+        if let Some(model_file) = config.model_file {
+            machine.wait_for_model(model_file)?;
         }
         Ok(machine)
     }
 
     /// Waits until the kernel has accepted the model file with this checksum.
-    fn wait_for_pack(&mut self, pack: u32) -> anyhow::Result<()> {
+    fn wait_for_model(&mut self, model_file: u32) -> anyhow::Result<()> {
         let mut watchdog = Watchdog::new(self.process, self.limits.answer);
-        while self.run.pack.is_none() {
+        while self.run.model_file.is_none() {
             if !self.pump_or_wait(&mut watchdog)? {
                 return Err(self.fail(Verdict::Hang {
                     waited_for: "what the kernel says of the model".into(),
@@ -239,9 +239,9 @@ impl Machine {
             }
         }
         match self.said_of_pack() {
-            Some(said) if said == format!("{LOADED} pack {pack:08x}") => Ok(()),
+            Some(said) if said == format!("{LOADED} model {model_file:08x}") => Ok(()),
             said => bail!(
-                "the kernel should have taken the pack {pack:08x}, and says '{}'",
+                "the kernel should have taken the model file {model_file:08x}, and says '{}'",
                 said.unwrap_or_default()
             ),
         }
@@ -249,7 +249,7 @@ impl Machine {
 
     /// Returns the kernel's line about the model file in its ramdisk: accepted, or refused with the reason.
     pub fn said_of_pack(&self) -> Option<&str> {
-        self.run.pack.as_deref()
+        self.run.model_file.as_deref()
     }
 
     /// Returns QEMU's process ID.
@@ -277,7 +277,7 @@ impl Machine {
         {
             if self.run.lines.is_empty() && !self.pump_or_wait(&mut watchdog)? {
                 return Err(self.fail(Verdict::Hang {
-                    waited_for: "the first picture".into(),
+                    waited_for: "the first frame".into(),
                 }));
             }
         }
@@ -712,7 +712,7 @@ impl Card for Machine {
             bail!("QEMU takes no screendump: {error}");
         }
         let bytes = file.bytes().context("QEMU's screendump cannot be read")?;
-        Screen::from_ppm(&bytes).context("QEMU's screendump is no picture")
+        Screen::from_ppm(&bytes).context("QEMU's screendump is no frame")
     }
 }
 
@@ -773,7 +773,8 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event
                     continue;
                 };
                 let text = line.map_err(|noise| noise.to_string()).and_then(|line| {
-                    protocol::unframe(line).map_err(|error| format!("{error}: {}", quoted(line)))
+                    protocol::without_checksum(line)
+                        .map_err(|error| format!("{error}: {}", quoted(line)))
                 });
                 greeted |= text.is_ok();
                 let event = match text {

@@ -59,7 +59,7 @@ pub struct Run {
     /// The kernel's first line has come.
     pub hello: bool,
     /// The kernel's line about the model file in its ramdisk: accepted or refused.
-    pub pack: Option<String>,
+    pub model_file: Option<String>,
     /// The user's arguments ask QEMU for a list (`-d help`).
     pub asked_for_list: bool,
     /// The machine has been started.
@@ -117,7 +117,7 @@ impl Run {
             }
             self.hello = true;
         } else if [LOADED, REFUSED].contains(&word) {
-            self.pack = Some(line);
+            self.model_file = Some(line);
         } else if [PANIC, EXCEPTION, ADAPTER].contains(&word) || !self.report.is_empty() {
             let whole = line == END_OF_REPORT;
             self.report.push(line);

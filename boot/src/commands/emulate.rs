@@ -19,8 +19,8 @@ Examples:
 /// Writes a dump and a PNG of each frame.
 pub fn run(common: &Common, frames: &Frames) -> anyhow::Result<()> {
     let model = common.load()?;
-    let pack = model.as_ref().map(Model::pack);
+    let model_file = model.as_ref().map(Model::file);
     let mut memory = card::memory();
-    let mut card = Emulated::with(&mut memory, pack.as_ref())?;
+    let mut card = Emulated::with(&mut memory, model_file.as_ref())?;
     frames.write(&mut card, &common.look, print_path)
 }

@@ -25,9 +25,9 @@ pub fn run(mut common: Common, options: &Options) -> anyhow::Result<ExitCode> {
     }
     let model = common.load_to_boot()?;
     let mut machine = common.boot(model.as_ref())?;
-    let pack = model.as_ref().map(Model::pack);
+    let model_file = model.as_ref().map(Model::file);
     let mut memory = card::memory();
-    let mut emulated = Emulated::with(&mut memory, pack.as_ref())?;
+    let mut emulated = Emulated::with(&mut memory, model_file.as_ref())?;
     options.record(&mut machine, &mut emulated, &common.look, print_path)?;
     machine.leave()?;
     Ok(ExitCode::SUCCESS)

@@ -30,8 +30,8 @@ pub fn run(common: Common, mut options: Options) -> anyhow::Result<ExitCode> {
         .mappers
         .extend(mapper.map(|mapper| mapper.to_string()));
     let model = common.load()?;
-    let pack = model.as_ref().map(Model::pack);
-    let page = trade::run(&options, common.options, pack.as_ref())?;
+    let model_file = model.as_ref().map(Model::file);
+    let page = trade::run(&options, common.options, model_file.as_ref())?;
     say("the results, as a page with tables and plots beside it:");
     print_path(&page)?;
     Ok(ExitCode::SUCCESS)

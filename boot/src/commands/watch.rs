@@ -38,7 +38,7 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
         };
         say(format_args!("{why}: booting without a window"));
     }
-    let name = png_name(look, config.pack);
+    let name = png_name(look, config.model_file);
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
@@ -74,14 +74,14 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
 }
 
 /// Returns the name of a run's PNG. Two runs at once that show different things write different files.
-fn png_name(look: &Look, pack: Option<u32>) -> String {
-    let mut name = String::from("picture");
+fn png_name(look: &Look, model_file: Option<u32>) -> String {
+    let mut name = String::from("frame");
     for command in look.commands() {
         if let Command::Set(_, Some(word)) = command {
             // A tolerance is a fraction.
             name += &format!("-{word}").replace('/', "_");
         }
     }
-    name.extend(pack.map(|pack| format!("-{pack:08x}")));
+    name.extend(model_file.map(|model_file| format!("-{model_file:08x}")));
     name + ".png"
 }

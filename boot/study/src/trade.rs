@@ -13,7 +13,7 @@
 //! | `error-cost-one.svg` | error against cost on the tilted square alone |
 //! | `error-column.svg` | the error along one long column |
 //! | `cost-length.svg` | cost against span length |
-//! | `pictures/` | the page's images |
+//! | `images/` | the page's images |
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
 use clap::builder::PossibleValuesParser;
-use model::{Arena, Pack};
+use model::{Arena, ModelFile};
 use scene::catalogue::Entry;
 use texmap::loops::Loop;
 use texmap::{Mapper, Order};
@@ -127,10 +127,10 @@ pub fn check_build() -> anyhow::Result<()> {
 pub fn run(
     options: &Options,
     setup: setup::Options,
-    model: Option<&Pack<'_>>,
+    model: Option<&ModelFile<'_>>,
 ) -> anyhow::Result<PathBuf> {
     let mut arena = in_place::boxed!(Arena);
-    let model = model.map(|pack| pack.entry(&mut arena));
+    let model = model.map(|model_file| model_file.entry(&mut arena));
     let out = match &options.out {
         Some(out) => out.clone(),
         None => setup::folder().join("trade"),
@@ -150,7 +150,7 @@ pub fn run(
         true => Effort::QUICK,
         false => Effort::FULL,
     };
-    fs::create_dir_all(out.join("pictures"))
+    fs::create_dir_all(out.join("images"))
         .with_context(|| format!("{} cannot be made", out.display()))?;
     // The kernel comes first, so that a missing part of its set-up is reported at once.
     let measured = match options.host_only {
@@ -224,7 +224,7 @@ fn measure(
     let mut step = Step::counting("measuring scenes", scenes.len() as u64);
     for (done, name) in (1..).zip(scenes) {
         let look = |subject: &Subject<'_>| {
-            let number = TIMED.min(subject.pictures.len() - 1);
+            let number = TIMED.min(subject.frames.len() - 1);
             let mut costs = cost::measure(subject, number, mappers, effort).into_iter();
             let rows = mappers.iter().map(|&mapper| Row {
                 mapper,
@@ -274,7 +274,7 @@ fn measure(
 
 /// Returns the longest column of a subject's first frame, and the errors of some mappers along it.
 fn along_column(subject: &Subject<'_>) -> Option<(u16, Vec<Line>)> {
-    let faces = &subject.pictures[0];
+    let faces = &subject.frames[0];
     let mut pixels = BTreeMap::new();
     let errors = |mapper, sink: &mut dyn FnMut((u16, u16), f64)| {
         for face in faces {
@@ -334,7 +334,7 @@ impl Found {
         if let Some(measured) = &self.kernel {
             let about = format!(
                 "In QEMU {}: instructions under `-icount shift=0`, exact; writes and reads of a \
-                 picture of the ball, exact; times of its whole frame under plain TCG, medians of \
+                 frame of the ball, exact; times of its whole frame under plain TCG, medians of \
                  five rounds (least to most).",
                 measured.qemu
             );
@@ -361,11 +361,11 @@ impl Found {
         put("trade.csv", &table::csv(&self.tables))?;
         put("sweep.csv", &table::sweep_csv(&self.swept))?;
 
-        let folder = "pictures";
+        let folder = "images";
         for gallery in &self.galleries {
             for shown in &gallery.shown {
                 let path = |map| out.join(folder).join(gallery.file(shown, map));
-                write_atomically(&path(false), |file| shown.picture.write_png(file))?;
+                write_atomically(&path(false), |file| shown.image.write_png(file))?;
                 write_atomically(&path(true), |file| shown.heat.write_png(file))?;
             }
         }
@@ -403,7 +403,7 @@ impl Found {
             let Some(table) = table else { continue };
             let points = table.rows.iter().map(|row| Point {
                 mapper: row.mapper,
-                cost: row.best().picture.time.median,
+                cost: row.best().frame.time.median,
                 error: row.accuracy.errors.percentile(0.99),
                 by_planes: row.best().order == Order::Planes,
             });
@@ -411,7 +411,7 @@ impl Found {
             let svg = plot::error_against_cost(
                 [
                     &format!("Error against cost: {}", table.scene),
-                    "whole pictures in RAM, in the cheaper of both orders",
+                    "whole frames in RAM, in the cheaper of both orders",
                 ],
                 [
                     &format!("{unit} a pixel"),
@@ -502,10 +502,10 @@ mod tests {
         let mappers = ["affine", "packed", "linear-16", "exact"];
         let mappers = mappers.map(|name| Mapper::parse(name).unwrap());
         let effort = Effort { slice: 1 };
-        fs::create_dir(out.path().join("pictures")).unwrap();
+        fs::create_dir(out.path().join("images")).unwrap();
         let model = Model::new(b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 3 2 1\n", None).unwrap();
         let mut arena = in_place::boxed!(Arena);
-        let model = model.pack().entry(&mut arena);
+        let model = model.file().entry(&mut arena);
         let scenes = ["tilted", "wall", model.name];
         let found = measure(&scenes, Some(&model), &mappers, 1, effort);
         found.write(out.path(), &["about".into()]).unwrap();
@@ -530,7 +530,7 @@ mod tests {
             assert!(html.contains(svg.trim()), "{name}");
         }
         // Every image that the page names exists.
-        let named = html.split('"').filter(|part| part.starts_with("pictures/"));
+        let named = html.split('"').filter(|part| part.starts_with("images/"));
         let mut count = 0;
         for name in named {
             assert!(out.path().join(name).is_file(), "{name}");

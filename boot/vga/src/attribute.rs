@@ -73,7 +73,7 @@ impl Attribute {
     }
 
     /// Reports what blanks or garbles the image. QEMU's image looks right even with wrong values here.
-    pub fn check_picture(&self, graphics: bool) -> Result<(), Complaint> {
+    pub fn check_display(&self, graphics: bool) -> Result<(), Complaint> {
         if let Some(i) = self.registers.iter().position(Option::is_none) {
             return Err(("register was never written", format!("AR{i:02X}")));
         }

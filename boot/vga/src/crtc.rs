@@ -15,7 +15,7 @@ const PROTECT: u8 = 0x80;
 #[rustfmt::skip]
 const PLAIN: &[(u8, u8, u8, &str)] = &[
     (0x03, 0x80, 0x80, "lets CR10 and CR11 be read"),
-    (0x03, 0x60, 0x00, "the picture is not skewed against the syncs"),
+    (0x03, 0x60, 0x00, "the frame is not skewed against the syncs"),
     (0x05, 0x60, 0x00, "the retrace is not skewed"),
     (0x08, 0xFF, 0x00, "no scrolling by lines or bytes"),
     (0x0A, 0xFF, 0x00, "the text cursor: not shown in graphics"),

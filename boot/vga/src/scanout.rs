@@ -22,7 +22,7 @@ pub struct Page {
 
 /// The image on the monitor, a colour for every dot: 640x480 in Mode X, where each pixel is two by two dots.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Picture {
+pub struct Frame {
     /// Dots across.
     pub width: usize,
     /// Scan lines.
@@ -33,8 +33,8 @@ pub struct Picture {
 
 impl Page {
     pub(crate) fn of(card: &Vga) -> Result<Self, Complaint> {
-        card.sequencer.check_picture()?;
-        card.attribute.check_picture(card.graphics.is_graphics())?;
+        card.sequencer.check_display()?;
+        card.attribute.check_display(card.graphics.is_graphics())?;
         let timing = card.crtc.timing()?;
         // A pixel in a 256-colour mode is two of the 8 dots of a character wide.
         let (width, height) = (timing.across.shown * 4, timing.down.shown / timing.repeat);
@@ -68,7 +68,7 @@ impl Page {
     }
 
     /// The image that the monitor shows of this page.
-    pub fn scan_out(&self) -> Picture {
+    pub fn scan_out(&self) -> Frame {
         // A pixel in a 256-colour mode is two dots wide.
         let width = 2 * self.width;
         let height = self.height * self.repeat;
@@ -80,7 +80,7 @@ impl Page {
                     .flat_map(|&pixel| [self.palette[usize::from(pixel)]; 2]),
             );
         }
-        Picture {
+        Frame {
             width,
             height,
             dots,
@@ -100,8 +100,8 @@ impl std::fmt::Debug for Page {
     }
 }
 
-impl std::fmt::Debug for Picture {
+impl std::fmt::Debug for Frame {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "a picture of {} x {} dots", self.width, self.height)
+        write!(f, "a frame of {} x {} dots", self.width, self.height)
     }
 }

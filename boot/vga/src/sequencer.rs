@@ -71,7 +71,7 @@ impl Sequencer {
     }
 
     /// Reports what blanks the screen. QEMU ignores SR0 and SR1 bit 5.
-    pub fn check_picture(&self) -> Result<(), Complaint> {
+    pub fn check_display(&self) -> Result<(), Complaint> {
         if self.registers[usize::from(RESET)] != Some(RUNNING) {
             return Err((
                 "sequencer is in reset",

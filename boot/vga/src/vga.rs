@@ -12,7 +12,7 @@ use crate::graphics::Graphics;
 use crate::memory::{Memory, PAGE_BYTES, PAGES_END};
 use crate::monitor;
 use crate::ports::*;
-use crate::scanout::{Page, Picture};
+use crate::scanout::{Frame, Page};
 use crate::sequencer::Sequencer;
 
 /// Character clocks of each access: 0.95 us, as an 8-bit access on an ISA bus.
@@ -130,7 +130,7 @@ impl Vga {
     ///
     /// # Errors
     /// As [`Vga::page`].
-    pub fn scan_out(&self) -> Result<Picture, Fault> {
+    pub fn scan_out(&self) -> Result<Frame, Fault> {
         Ok(self.page()?.scan_out())
     }
 

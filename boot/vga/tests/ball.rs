@@ -6,7 +6,7 @@ use scene::{Pose, Stage, Storage};
 use vga::Vga;
 
 #[test]
-fn every_picture_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
+fn every_frame_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
     let mut texels = Box::new([0; scene::TEXELS]);
     let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);
@@ -34,9 +34,9 @@ fn every_picture_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
                 );
             }
         }
-        let picture = vga.scan_out().unwrap();
-        assert_eq!((picture.width, picture.height), (2 * WIDTH, 2 * HEIGHT));
-        for (i, &dot) in picture.dots.iter().enumerate() {
+        let shown = vga.scan_out().unwrap();
+        assert_eq!((shown.width, shown.height), (2 * WIDTH, 2 * HEIGHT));
+        for (i, &dot) in shown.dots.iter().enumerate() {
             let colour = page.pixel(i % 640 / 2, i / 640 / 2);
             assert_eq!(
                 dot,

@@ -165,7 +165,7 @@ fn pages_rotate_unseen_whatever_interrupts() {
             0 => delays.usize(..longest),
             _ => 0,
         });
-        for picture in 0..20 {
+        for frame in 0..20 {
             let mut canvas = card.begin(&[0; HEIGHT]);
             for _ in 0..random.usize(1..30) {
                 let (x, y) = (random.u16(..320), random.u16(..HEIGHT as u16));
@@ -176,7 +176,7 @@ fn pages_rotate_unseen_whatever_interrupts() {
             if random.bool() {
                 card.settle();
             }
-            assert_eq!(card.bus().take_faults(), [], "{latch:?}, picture {picture}");
+            assert_eq!(card.bus().take_faults(), [], "{latch:?}, frame {frame}");
         }
     }
 }

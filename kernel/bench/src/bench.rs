@@ -243,7 +243,7 @@ impl<'a, B: Bus> Bench<'a, B> {
                 self.card.flip();
                 ticks
             }
-            Work::Present => (0..work.pictures())
+            Work::Present => (0..work.frames())
                 .map(|_| {
                     let ticks = ticks(now, &mut || self.card.present(self.offscreen));
                     self.card.flip();
@@ -251,7 +251,7 @@ impl<'a, B: Bus> Bench<'a, B> {
                 })
                 .sum(),
             Work::FrameCard => ticks(now, &mut || {
-                for _ in 0..work.pictures() {
+                for _ in 0..work.frames() {
                     let mut canvas = self.card.begin(background);
                     stats = self.stage.draw(&self.pose, &mut canvas);
                     self.card.flip();
@@ -287,7 +287,7 @@ impl<'a, B: Bus> Bench<'a, B> {
                 })
             }
             Work::FramePresented => ticks(now, &mut || {
-                for _ in 0..work.pictures() {
+                for _ in 0..work.frames() {
                     self.offscreen.begin(background);
                     stats = self.stage.draw(&self.pose, self.offscreen);
                     self.card.present(self.offscreen);
@@ -309,7 +309,7 @@ impl<'a, B: Bus> Bench<'a, B> {
             } else {
                 WIDTH * HEIGHT
             };
-            Figure::new(pixels as u64 * u64::from(work.pictures()))
+            Figure::new(pixels as u64 * u64::from(work.frames()))
         });
         for round in 0..=rounds {
             for (figure, (_, work)) in figures.iter_mut().zip(Work::ALL) {
@@ -393,7 +393,7 @@ impl<'a, B: Bus> Bench<'a, B> {
 /// Returns how many pairs of clock reads the ticks of a piece of work include.
 fn pairs(work: Work) -> u64 {
     match work {
-        Work::Present => u64::from(work.pictures()),
+        Work::Present => u64::from(work.frames()),
         _ => 1,
     }
 }

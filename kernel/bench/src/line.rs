@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use protocol::{FrameError, unframe};
+use protocol::{ChecksumError, without_checksum};
 use texmap::{Mapper, Order};
 
 /// Most rounds of one measurement.
@@ -30,7 +30,7 @@ pub enum AskError {
     /// The line is not one of the five requests.
     Unknown,
     /// The line has a checksum, which is wrong.
-    Checksum(FrameError),
+    Checksum(ChecksumError),
 }
 
 impl fmt::Display for AskError {
@@ -52,9 +52,9 @@ impl Ask {
     /// # Errors
     /// The line is not a request.
     pub fn parse(line: &str) -> Result<Self, AskError> {
-        let text = match unframe(line) {
+        let text = match without_checksum(line) {
             Ok(text) => text,
-            Err(FrameError::NoChecksum) => line,
+            Err(ChecksumError::NoChecksum) => line,
             Err(wrong) => return Err(AskError::Checksum(wrong)),
         };
         Self::words(text.split(' ')).ok_or(AskError::Unknown)

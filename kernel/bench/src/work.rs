@@ -75,7 +75,7 @@ impl Work {
     /// [`Work::Present`], [`Work::FrameCard`] and [`Work::FramePresented`] draw two frames and flip after
     /// each: with three pages in rotation, every second frame waits for a retrace, so two frames together
     /// always need the same time.
-    pub fn pictures(self) -> u32 {
+    pub fn frames(self) -> u32 {
         match self {
             Self::Present | Self::FrameCard | Self::FramePresented => 2,
             _ => 1,

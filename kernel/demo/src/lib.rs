@@ -21,12 +21,12 @@ mod steering;
 
 use core::fmt;
 
-use model::{Arena, Pack};
+use model::{Arena, ModelFile};
 use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, SetError, Tally, WIDTH};
 use protocol::dump::{self, Header, OrNone};
 use protocol::{
-    Action, Change, Command, Content, ERROR, Fault, Lines, Motion, OK, PROTOCOL, Picture, RUNNING,
-    Reception, Setting, Word,
+    Action, Change, Command, Content, ERROR, Fault, FrameName, Lines, Motion, OK, PROTOCOL,
+    RUNNING, Reception, Setting, Word,
 };
 use scene::catalogue::{Entry, MAX_TEXELS};
 use scene::{Pose, Stage, Storage};
@@ -94,7 +94,7 @@ pub enum Request {
 /// The frame on the screen: everything except the scene that a dump's header needs to draw it again.
 #[derive(Clone, Copy, Debug)]
 struct Shown {
-    picture: Picture,
+    frame: FrameName,
     /// The motion that decided which faces are drawn in reduced quality; `None` if all faces have full
     /// quality.
     motion: Option<Motion>,
@@ -107,7 +107,7 @@ struct Pace {
     /// The tick of the last frame.
     last: Option<u32>,
     /// Number of frames shown.
-    pictures: u32,
+    frames: u32,
     /// Number of frames that came more than one tick after the frame before.
     late: u32,
 }
@@ -116,8 +116,8 @@ struct Pace {
 #[derive(Debug)]
 pub struct Show<'a, B> {
     card: ModeX<Counted<B>>,
-    /// The checksum of the pack that contains the loaded model.
-    pack: Option<u32>,
+    /// The checksum of the model file that contains the loaded model.
+    model_file: Option<u32>,
     /// The state that the next frame depends on; `log` says how it came about.
     state: State<'a>,
     log: Log<'a>,
@@ -144,19 +144,23 @@ pub struct Show<'a, B> {
 
 impl<'a, B: Bus> Show<'a, B> {
     /// Paints the default scene into `memory`, sets the card's mode, and starts a running demo. The model of
-    /// `pack` becomes a scene beside the built-in ones, and the default. Without a pack, the ball is the
+    /// `model_file` becomes a scene beside the built-in ones, and the default. Without a model file, the ball is the
     /// default.
     ///
     /// # Errors
     /// As [`ModeX::set`]: nothing can be drawn on this card.
-    pub fn new(memory: &'a mut Memory, bus: B, pack: Option<&Pack<'a>>) -> Result<Self, SetError> {
+    pub fn new(
+        memory: &'a mut Memory,
+        bus: B,
+        model_file: Option<&ModelFile<'a>>,
+    ) -> Result<Self, SetError> {
         let arena = &mut memory.model;
-        let scenes = Scenes::new(pack.map(|pack| pack.entry(arena)));
+        let scenes = Scenes::new(model_file.map(|model_file| model_file.entry(arena)));
         let state = State::of(scenes, scenes.default());
         let textures = state.entry.paint(&mut memory.texels);
         let stage = Stage::new(&mut memory.storage, state.entry.scene(&textures));
         Ok(Self {
-            pack: pack.map(Pack::checksum),
+            model_file: model_file.map(ModelFile::checksum),
             state,
             log: Log::new(state, &mut memory.notes),
             overlay: Overlay::new(&mut memory.writing, stage.palette()),
@@ -191,7 +195,7 @@ impl<'a, B: Bus> Show<'a, B> {
         let Some(pace) = &mut self.pace else { return };
         let before = pace.last.replace(tick);
         pace.late += u32::from(before.is_some_and(|before| tick.wrapping_sub(before) > 1));
-        pace.pictures = pace.pictures.wrapping_add(1);
+        pace.frames = pace.frames.wrapping_add(1);
         if before.is_none() {
             out(format_args!("{RUNNING}"));
         }
@@ -264,8 +268,8 @@ impl<'a, B: Bus> Show<'a, B> {
                 }
                 self.pace = Some(Pace::default());
             }
-            Command::Show(picture) => self.show(picture, None, out)?,
-            Command::ShowMoving(picture, motion) => self.show(picture, Some(motion), out)?,
+            Command::Show(frame) => self.show(frame, None, out)?,
+            Command::ShowMoving(frame, motion) => self.show(frame, Some(motion), out)?,
             Command::ShowAt(tick) => {
                 let Some(state) = self.log.state(tick) else {
                     out(format_args!(
@@ -322,9 +326,9 @@ impl<'a, B: Bus> Show<'a, B> {
     }
 
     /// Carries `show` out. Returns `None`, after writing why, if the command is refused.
-    fn show(&mut self, picture: Picture, motion: Option<Motion>, out: &mut Out<'_>) -> Option<()> {
+    fn show(&mut self, frame: FrameName, motion: Option<Motion>, out: &mut Out<'_>) -> Option<()> {
         let most = Pose::MAX_DISTANCE;
-        let Some(pose) = pose(&self.state.entry, picture) else {
+        let Some(pose) = pose(&self.state.entry, frame) else {
             out(format_args!("{ERROR} a distance is 0 to {most:08x}"));
             return None;
         };
@@ -332,7 +336,7 @@ impl<'a, B: Bus> Show<'a, B> {
             Some(None) => {
                 let from = pose.distance;
                 out(format_args!(
-                    "{ERROR} this motion leaves the legal distances, 0 to {most:08x}; the picture's \
+                    "{ERROR} this motion leaves the legal distances, 0 to {most:08x}; the frame's \
                      distance is {from:08x}: use a motion that keeps the sum legal"
                 ));
                 return None;
@@ -342,14 +346,14 @@ impl<'a, B: Bus> Show<'a, B> {
         if self.hold() {
             self.reset();
         }
-        self.draw(picture, &pose, next, false);
+        self.draw(frame, &pose, next, false);
         self.tell_page(out);
         Some(())
     }
 
     /// Draws a frame on the next page, and flips. With `next`, the pose at the next tick, the frame is drawn
     /// in reduced quality.
-    fn draw(&mut self, picture: Picture, pose: &Pose, next: Option<Pose>, overlay: bool) {
+    fn draw(&mut self, frame: FrameName, pose: &Pose, next: Option<Pose>, overlay: bool) {
         self.card.bus().take_counts();
         let State { mapper, order, .. } = self.state;
         self.stage.set_mapper(mapper);
@@ -380,7 +384,7 @@ impl<'a, B: Bus> Show<'a, B> {
         // A motion that reduces no face's quality makes no difference, so it is not part of the name.
         let reduced = next.filter(|_| self.stage.lowered() > 0);
         self.shown = Some(Shown {
-            picture,
+            frame,
             motion: reduced.map(|next| motion(pose, &next)),
             mapper,
         });
@@ -390,14 +394,14 @@ impl<'a, B: Bus> Show<'a, B> {
     fn draw_at(&mut self, tick: u32) {
         let pose = self.state.pose(tick);
         let own = pose == self.state.entry.pose(tick);
-        let picture = if own {
-            Picture::Frame(tick)
+        let frame = if own {
+            FrameName::Number(tick)
         } else {
             name(&pose)
         };
         let next = self.state.lower.then(|| self.state.next_pose(tick));
         let overlay = self.pace.is_some() && self.prepare_overlay(tick);
-        self.draw(picture, &pose, next, overlay);
+        self.draw(frame, &pose, next, overlay);
     }
 
     /// Prepares the overlay for the frame of a tick. Returns whether the frame has an overlay.
@@ -573,12 +577,14 @@ impl<'a, B: Bus> Show<'a, B> {
         Header {
             content,
             scene: self.state.entry.name,
-            pack: self.pack.filter(|_| self.state.entry.name == Entry::LOADED),
+            model_file: self
+                .model_file
+                .filter(|_| self.state.entry.name == Entry::LOADED),
             mapper: self.shown.map(|shown| {
                 let name = Word::of(shown.mapper);
                 name.expect("a mapper's name is a word")
             }),
-            picture: self.shown.map(|shown| shown.picture),
+            frame: self.shown.map(|shown| shown.frame),
             motion: self.shown.and_then(|shown| shown.motion),
             start: self.card.start_address(),
             width: WIDTH as u16,
@@ -623,7 +629,7 @@ impl<'a, B: Bus> Show<'a, B> {
             full,
         } = self.drawn;
         out(format_args!(
-            "picture polygons {polygons} columns {columns} pixels {pixels} dropped {dropped} full {full}"
+            "frame polygons {polygons} columns {columns} pixels {pixels} dropped {dropped} full {full}"
         ));
         for (purpose, tally) in self.card.bus().counts().named() {
             let Tally {
@@ -637,10 +643,8 @@ impl<'a, B: Bus> Show<'a, B> {
                 "{purpose} ports {ports} map-mask {map_mask} stores {stores} bytes {bytes}"
             ));
         }
-        if let Some(Pace { pictures, late, .. }) = self.pace {
-            out(format_args!(
-                "pace pictures {pictures} late {late} tick {tick}"
-            ));
+        if let Some(Pace { frames, late, .. }) = self.pace {
+            out(format_args!("pace frames {frames} late {late} tick {tick}"));
         }
         let (taken, lost) = self.codes;
         out(format_args!("keys taken {taken} lost {lost}"));
@@ -654,14 +658,14 @@ impl<'a, B: Bus> Show<'a, B> {
         let Header {
             scene,
             mapper,
-            picture,
+            frame,
             motion,
             ..
         } = self.header(Content::Page);
         out(format_args!("scene {scene}"));
         out(format_args!("mapper {}", self.state.mapper));
         out(format_args!("order {}", self.state.order));
-        out(format_args!("picture {}", OrNone(&picture)));
+        out(format_args!("frame {}", OrNone(&frame)));
         out(format_args!("motion {}", OrNone(&motion)));
         out(format_args!("drawn {}", OrNone(&mapper)));
         out(format_args!(
@@ -695,10 +699,10 @@ fn paint(
 }
 
 /// Returns the pose that a frame's name stands for, or `None` if its distance is outside the legal range.
-pub fn pose(scene: &Entry<'_>, picture: Picture) -> Option<Pose> {
-    match picture {
-        Picture::Frame(frame) => Some(scene.pose(frame)),
-        Picture::Pose {
+pub fn pose(scene: &Entry<'_>, frame: FrameName) -> Option<Pose> {
+    match frame {
+        FrameName::Number(frame) => Some(scene.pose(frame)),
+        FrameName::Pose {
             yaw,
             pitch,
             roll,
@@ -749,8 +753,8 @@ fn known(changed: Result<(), steering::Unknown>, change: Change, out: &mut Out<'
 }
 
 /// Returns the name of a pose.
-fn name(pose: &Pose) -> Picture {
-    Picture::Pose {
+fn name(pose: &Pose) -> FrameName {
+    FrameName::Pose {
         yaw: pose.yaw,
         pitch: pose.pitch,
         roll: pose.roll,

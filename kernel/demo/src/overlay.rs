@@ -235,7 +235,7 @@ pub(crate) struct Figures {
 #[derive(Clone, Copy, Debug, Default)]
 struct Window {
     since: u32,
-    pictures: u32,
+    frames: u32,
     micros: u64,
 }
 
@@ -322,13 +322,11 @@ impl<'a> Overlay<'a> {
     ) -> bool {
         let ticks = tick.wrapping_sub(self.window.since);
         if ticks >= RENEWAL {
-            let Window {
-                pictures, micros, ..
-            } = self.window;
+            let Window { frames, micros, .. } = self.window;
             // No pace after a long gap: the demo may just have begun.
-            if pictures > 0 && ticks < 100 * RENEWAL {
-                let tenths = pictures * 10 * TICKS_PER_SECOND / ticks;
-                self.pace = Some((tenths, (micros / u64::from(pictures)) as u32));
+            if frames > 0 && ticks < 100 * RENEWAL {
+                let tenths = frames * 10 * TICKS_PER_SECOND / ticks;
+                self.pace = Some((tenths, (micros / u64::from(frames)) as u32));
             }
             self.window = Window {
                 since: tick,
@@ -336,7 +334,7 @@ impl<'a> Overlay<'a> {
             };
             self.stale |= self.info || self.split;
         }
-        self.window.pictures += 1;
+        self.window.frames += 1;
         if self
             .hint
             .is_some_and(|since| tick.wrapping_sub(since) >= HINT)

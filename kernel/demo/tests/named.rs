@@ -106,14 +106,14 @@ fn draw_again(show: &mut Show<'_, Vga>, header: &[String]) {
         rest.unwrap_or_else(|| panic!("no line '{name}' in {header:?}"))
     };
     done(show, &format!("scene {}", line("scene")), 0);
-    assert_eq!(line("pack"), "none");
-    match (line("mapper"), line("picture"), line("motion")) {
+    assert_eq!(line("model"), "none");
+    match (line("mapper"), line("frame"), line("motion")) {
         ("none", "none", "none") => {}
-        (mapper, picture, motion) => {
+        (mapper, frame, motion) => {
             done(show, &format!("mapper {mapper}"), 0);
             let show_it = match motion {
-                "none" => format!("show {picture}"),
-                motion => format!("show {picture} motion {motion}"),
+                "none" => format!("show {frame}"),
+                motion => format!("show {frame} motion {motion}"),
             };
             done(show, &show_it, 0);
         }

@@ -15,7 +15,7 @@ fn evidence(show: &mut Show<'_, Vga>, tick: u32) -> Vec<String> {
     evidence[0] = crc.to_string();
     let state = done(show, "state", tick);
     let named = |line: &&String| {
-        let names = ["scene", "mapper", "picture", "motion", "drawn"];
+        let names = ["scene", "mapper", "frame", "motion", "drawn"];
         names.contains(&line.split(' ').next().unwrap())
     };
     evidence.extend(state.iter().filter(named).cloned());
@@ -29,19 +29,19 @@ const PAGE_UP: [u8; 2] = [0xE0, 0x49];
 const RELEASED: u8 = 0x80;
 
 #[test]
-fn a_log_brings_back_every_picture_byte_for_byte() {
+fn a_log_brings_back_every_frame_byte_for_byte() {
     let mut random = seeded::generator();
     let mut memory = asked::memory();
     let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
     let (mut tick, mut seen) = (random.u32(..1000), Vec::new());
-    for picture in 0..seeded::cases(80) {
+    for frame in 0..seeded::cases(80) {
         show.present(tick, &mut |_| {});
         // Frames with an overlay differ; the frames after them must not.
-        if picture / 10 % 2 == 0 {
+        if frame / 10 % 2 == 0 {
             seen.push((tick, evidence(&mut show, tick)));
         }
-        if picture % 10 == 9 {
-            let overlay = if picture < 40 { "help" } else { "info" };
+        if frame % 10 == 9 {
+            let overlay = if frame < 40 { "help" } else { "info" };
             done(&mut show, &format!("steer {overlay}"), tick);
         }
         // Some changes come after the frame of their tick, and some before it.
@@ -58,7 +58,7 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
                     .iter()
                     .for_each(|&code| show.key(code, tick)),
                 2 => _ = done(&mut show, "mapper within-3/8", tick),
-                3 if picture % 4 == 0 => _ = done(&mut show, "steer scene cube", tick),
+                3 if frame % 4 == 0 => _ = done(&mut show, "steer scene cube", tick),
                 _ => _ = done(&mut show, &format!("steer {action}"), tick),
             }
             tick += random.u32(..3);
@@ -85,15 +85,15 @@ fn a_log_brings_back_every_picture_byte_for_byte() {
     // A frame's name, including its motion, is enough to draw the frame.
     for (tick, shown) in &seen {
         done(&mut show, &format!("show at {tick}"), 0);
-        let [_, _, scene, mapper, picture, motion, _] = &shown[..] else {
+        let [_, _, scene, mapper, frame, motion, _] = &shown[..] else {
             panic!("{shown:?}")
         };
         done(&mut twin, scene, 0);
         done(&mut twin, mapper, 0);
-        let picture = picture.replacen("picture", "show", 1);
+        let frame = frame.replacen("frame", "show", 1);
         let motion = Some(motion).filter(|motion| *motion != "motion none");
         let motion = motion.map_or(String::new(), |motion| format!(" {motion}"));
-        done(&mut twin, &format!("{picture}{motion}"), 0);
+        done(&mut twin, &format!("{frame}{motion}"), 0);
         assert_eq!(&evidence(&mut twin, 0), shown);
     }
 }
@@ -119,12 +119,7 @@ fn a_running_show_can_be_stopped_at_a_tick_of_its_own() {
     show.present(20, &mut |_| {});
     assert_eq!(
         done(&mut show, "state", 20)[1..5],
-        [
-            "scene ball",
-            "mapper shifts",
-            "order polygons",
-            "picture 20",
-        ]
+        ["scene ball", "mapper shifts", "order polygons", "frame 20",]
     );
     assert_eq!(done(&mut show, "log", 20).len(), 3);
 }

@@ -1,4 +1,4 @@
-//! The memory that a pack's mesh is unpacked into.
+//! The memory that a model file's mesh is unpacked into.
 
 use scene::{Corner, Face, MAX_VERTICES, Vec3};
 

@@ -1,4 +1,4 @@
-//! Why bytes are not a legal pack.
+//! Why bytes are not a legal model file.
 
 use core::fmt;
 
@@ -7,22 +7,22 @@ use texmap::TextureError;
 
 use crate::{MAX_BYTES, VERSION};
 
-/// Why bytes are not a pack that can be shown. Vertices, corners, faces and colours are numbered from 0.
+/// Why bytes are not a model file that can be shown. Vertices, corners, faces and colours are numbered from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PackError {
+pub enum ModelError {
     /// The bytes do not begin with [`crate::MAGIC`].
-    NoPack,
-    /// The pack has this many bytes, fewer than a header.
+    NotAModelFile,
+    /// The model file has this many bytes, fewer than a header.
     Short(usize),
-    /// The pack has this many bytes, more than [`MAX_BYTES`].
+    /// The model file has this many bytes, more than [`MAX_BYTES`].
     TooLong(usize),
-    /// The pack has this version of the format, which is not [`VERSION`].
+    /// The model file has this version of the format, which is not [`VERSION`].
     Version(u32),
     /// The length in the header is wrong.
     Length {
         /// Length in the header.
         said: u32,
-        /// Length of the pack.
+        /// Length of the model file.
         actual: usize,
     },
     /// The checksum in the header is wrong: a byte was changed.
@@ -32,20 +32,20 @@ pub enum PackError {
         /// Checksum of the bytes.
         computed: u32,
     },
-    /// The pack has more items of a kind than the limit.
+    /// The model file has more items of a kind than the limit.
     TooMany {
         /// The kind of item.
         what: &'static str,
-        /// How many items the pack has.
+        /// How many items the model file has.
         count: usize,
         /// How many items are allowed.
         most: usize,
     },
-    /// The counts in the header do not match the length of the pack.
+    /// The counts in the header do not match the length of the model file.
     Parts {
         /// Bytes that the counted parts need.
         parts: usize,
-        /// Length of the pack.
+        /// Length of the model file.
         actual: usize,
     },
     /// The texture is not legal.
@@ -69,32 +69,35 @@ pub enum PackError {
     FaceCorners(usize),
     /// This face's normal is not a unit vector.
     FaceNormal(usize),
-    /// The faces' counts of corners do not add up to the corners of the pack.
+    /// The faces' counts of corners do not add up to the corners of the model file.
     Shared {
         /// Corners that the faces use.
         used: usize,
-        /// Corners that the pack has.
+        /// Corners that the model file has.
         there: usize,
     },
 }
 
-impl From<TextureError> for PackError {
+impl From<TextureError> for ModelError {
     fn from(error: TextureError) -> Self {
         Self::Texture(error)
     }
 }
 
-impl fmt::Display for PackError {
+impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoPack => f.write_str("it does not begin as a pack"),
-            Self::Short(len) => write!(f, "{len} bytes are too few for a pack"),
+            Self::NotAModelFile => f.write_str("it does not begin as a model file"),
+            Self::Short(len) => write!(f, "{len} bytes are too few for a model file"),
             Self::TooLong(len) => {
-                write!(f, "it has {len} bytes; a pack has at most {MAX_BYTES}")
+                write!(
+                    f,
+                    "it has {len} bytes; a model file has at most {MAX_BYTES}"
+                )
             }
             Self::Version(version) => write!(
                 f,
-                "it is a pack of version {version}; this program reads version {VERSION}"
+                "it is a model file of version {version}; this program reads version {VERSION}"
             ),
             Self::Length { said, actual } => {
                 write!(f, "its header says {said} bytes, and it has {actual}")
@@ -136,4 +139,4 @@ impl fmt::Display for PackError {
     }
 }
 
-impl core::error::Error for PackError {}
+impl core::error::Error for ModelError {}

@@ -1,7 +1,7 @@
 //! Packs: the file format of a model, for the kernel and for the host program with the emulated VGA.
 //!
 //! The host computes everything once: mesh, texels, palette and light table. Kernel and host then read the
-//! same bytes, so they draw the same frame, and a pack's checksum identifies the model.
+//! same bytes, so they draw the same frame, and a model file's checksum identifies the model.
 //!
 //! # The format, version 1
 //!
@@ -11,7 +11,7 @@
 //! | --- | --- |
 //! | 8 | [`MAGIC`] |
 //! | 4 | [`VERSION`] |
-//! | 4 | length of the whole pack in bytes |
+//! | 4 | length of the whole model file in bytes |
 //! | 4 | checksum: the CRC-32 (ISO-HDLC) of all bytes after it |
 //! | 2, 2, 2 | the numbers of vertices V, corners C and faces F |
 //! | 2, 2 | the texture's width W and height H |
@@ -28,9 +28,9 @@
 //!
 //! # Checks
 //!
-//! [`Pack::parse`] trusts nothing, because the bytes may come from anywhere. The checksum finds any
-//! accidental change. But a pack can be forged with a matching checksum, so every count, index and range is
-//! also checked. A scene made of an accepted pack is within every limit of [`scene::Stage`] and the mappers,
+//! [`ModelFile::parse`] trusts nothing, because the bytes may come from anywhere. The checksum finds any
+//! accidental change. But a model file can be forged with a matching checksum, so every count, index and range is
+//! also checked. A scene made of an accepted model file is within every limit of [`scene::Stage`] and the mappers,
 //! and can make none of them panic. Whether the scene looks good is not checked: faces may be bent, inside
 //! out or invisible.
 #![no_std]
@@ -48,15 +48,15 @@ use scene::{
 use texmap::Texture;
 
 pub use arena::Arena;
-pub use error::PackError;
+pub use error::ModelError;
 
-/// First bytes of a pack.
+/// First bytes of a model file.
 pub const MAGIC: [u8; 8] = *b"CBALPACK";
 /// Version of the format.
 pub const VERSION: u32 = 1;
 /// Most corners of all faces together: as many as the largest number of triangles has.
 pub const MAX_ALL_CORNERS: usize = 3 * MAX_FACES;
-/// Longest pack in bytes.
+/// Longest model file in bytes.
 pub const MAX_BYTES: usize = 512 * 1024;
 
 /// Bytes of magic, version, length and checksum, which come before the bytes that the checksum covers.
@@ -69,7 +69,7 @@ const VERTEX: usize = 12;
 const CORNER: usize = 10;
 const FACE: usize = 8;
 
-// A pack with the largest counts still fits `MAX_BYTES`.
+// A model file with the largest counts still fits `MAX_BYTES`.
 const _: () = assert!(
     HEADER
         + PALETTE
@@ -89,7 +89,7 @@ const NORMAL_SLACK: i64 = 1 << 16;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// The content of a pack.
+/// The content of a model file.
 #[derive(Clone, Copy, Debug)]
 pub struct Parts<'a> {
     /// The solid.
@@ -103,7 +103,7 @@ pub struct Parts<'a> {
 }
 
 impl Parts<'_> {
-    /// Passes the pack's bytes from the palette on to `sink`, in pieces and in order.
+    /// Passes the model file's bytes from the palette on to `sink`, in pieces and in order.
     fn body(&self, sink: &mut impl FnMut(&[u8])) {
         sink(self.colours.palette.as_flattened());
         sink(self.colours.light.as_flattened());
@@ -127,8 +127,8 @@ impl Parts<'_> {
         }
     }
 
-    /// Writes the pack in pieces, and returns its checksum. Values beyond a limit are written as they are;
-    /// [`Pack::parse`] refuses them. The faces use the corners one after the other, and all faces use the one
+    /// Writes the model file in pieces, and returns its checksum. Values beyond a limit are written as they are;
+    /// [`ModelFile::parse`] refuses them. The faces use the corners one after the other, and all faces use the one
     /// texture; their `first` and `texture` are ignored.
     pub fn write(&self, mut sink: impl FnMut(&[u8])) -> u32 {
         let Mesh {
@@ -162,9 +162,9 @@ impl Parts<'_> {
     }
 }
 
-/// A pack whose bytes have been checked. It borrows the bytes.
+/// A model file whose bytes have been checked. It borrows the bytes.
 #[derive(Clone, Copy, Debug)]
-pub struct Pack<'p> {
+pub struct ModelFile<'p> {
     checksum: u32,
     colours: Colours<'p>,
     background: &'p [u8; HEIGHT],
@@ -194,37 +194,37 @@ impl<'p> Reader<'p> {
     }
 }
 
-impl<'p> Pack<'p> {
-    /// Parses a pack, and checks all of it.
+impl<'p> ModelFile<'p> {
+    /// Parses a model file, and checks all of it.
     ///
     /// # Errors
     /// The first value that is not legal.
-    pub fn parse(bytes: &'p [u8]) -> Result<Self, PackError> {
+    pub fn parse(bytes: &'p [u8]) -> Result<Self, ModelError> {
         if bytes.len() > MAX_BYTES {
-            return Err(PackError::TooLong(bytes.len()));
+            return Err(ModelError::TooLong(bytes.len()));
         }
-        // Check the magic first: bytes of another kind are reported as no pack, not as a short pack.
+        // Check the magic first: bytes of another kind are reported as no model file, not as a short model file.
         if !bytes.starts_with(&MAGIC) {
-            return Err(PackError::NoPack);
+            return Err(ModelError::NotAModelFile);
         }
         let (header, _) = bytes
             .split_first_chunk::<HEADER>()
-            .ok_or(PackError::Short(bytes.len()))?;
+            .ok_or(ModelError::Short(bytes.len()))?;
         let word = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
         let long = |at: usize| u32::from(word(at)) | u32::from(word(at + 2)) << 16;
         // Another version may have its length and checksum in other places.
         let version = long(8);
         if version != VERSION {
-            return Err(PackError::Version(version));
+            return Err(ModelError::Version(version));
         }
         let said = long(12);
         if said as usize != bytes.len() {
             let actual = bytes.len();
-            return Err(PackError::Length { said, actual });
+            return Err(ModelError::Length { said, actual });
         }
         let (said, computed) = (long(16), CRC.checksum(&bytes[SUMMED..]));
         if said != computed {
-            return Err(PackError::Checksum { said, computed });
+            return Err(ModelError::Checksum { said, computed });
         }
         let [vertices, corners, faces] = [20, 22, 24].map(|at| usize::from(word(at)));
         let (width, height) = (word(26), word(28));
@@ -234,7 +234,7 @@ impl<'p> Pack<'p> {
             ("faces", faces, MAX_FACES),
         ] {
             if count > most {
-                return Err(PackError::TooMany { what, count, most });
+                return Err(ModelError::TooMany { what, count, most });
             }
         }
         let texels = usize::from(width) * usize::from(height);
@@ -242,7 +242,7 @@ impl<'p> Pack<'p> {
         let parts = fixed + texels + vertices * VERTEX + corners * CORNER + faces * FACE;
         if parts != bytes.len() {
             let actual = bytes.len();
-            return Err(PackError::Parts { parts, actual });
+            return Err(ModelError::Parts { parts, actual });
         }
 
         let mut reader = Reader {
@@ -252,7 +252,7 @@ impl<'p> Pack<'p> {
         let light: &LightTable = whole(reader.records(LIGHT_LEVELS));
         let background = whole(reader.take(HEIGHT));
         let texture = Texture::new(reader.take(texels), width, height)?;
-        let pack = Self {
+        let model_file = Self {
             checksum: said,
             colours: Colours { palette, light },
             background,
@@ -261,51 +261,51 @@ impl<'p> Pack<'p> {
             corners: reader.records(corners),
             faces: reader.records(faces),
         };
-        pack.check()?;
-        Ok(pack)
+        model_file.check()?;
+        Ok(model_file)
     }
 
     /// Checks every value against its range.
-    fn check(&self) -> Result<(), PackError> {
+    fn check(&self) -> Result<(), ModelError> {
         let beyond_dac = |colour: &[u8; 3]| colour.iter().any(|&part| part > 63);
         if let Some(entry) = self.colours.palette.iter().position(beyond_dac) {
-            return Err(PackError::Colour(entry));
+            return Err(ModelError::Colour(entry));
         }
         let extent = -MAX_EXTENT..=MAX_EXTENT;
         for (i, vertex) in self.vertices.iter().map(vertex).enumerate() {
             if !vertex.iter().all(|k| extent.contains(k)) {
-                return Err(PackError::Vertex(i));
+                return Err(ModelError::Vertex(i));
             }
         }
         let width = i32::from(self.texture.width()) << 16;
         let height = i32::from(self.texture.height()) << 16;
         for (i, corner) in self.corners.iter().map(corner).enumerate() {
             if usize::from(corner.vertex) >= self.vertices.len() {
-                return Err(PackError::CornerVertex {
+                return Err(ModelError::CornerVertex {
                     corner: i,
                     vertex: corner.vertex,
                     vertices: self.vertices.len(),
                 });
             }
             if !(0..=width).contains(&corner.u) || !(0..=height).contains(&corner.v) {
-                return Err(PackError::CornerPlace(i));
+                return Err(ModelError::CornerPlace(i));
             }
         }
         let mut first = 0;
         for (i, face) in self.faces.iter().enumerate() {
             let face = face_at(face, first);
             if !(3..=MAX_CORNERS).contains(&face.corners.into()) {
-                return Err(PackError::FaceCorners(i));
+                return Err(ModelError::FaceCorners(i));
             }
             let length: i64 = face.normal.iter().map(|&k| i64::from(k).pow(2)).sum();
             if (length - (1 << 28)).abs() > NORMAL_SLACK {
-                return Err(PackError::FaceNormal(i));
+                return Err(ModelError::FaceNormal(i));
             }
             // The sum is at most MAX_FACES x MAX_CORNERS.
             first += usize::from(face.corners);
         }
         if first != self.corners.len() {
-            return Err(PackError::Shared {
+            return Err(ModelError::Shared {
                 used: first,
                 there: self.corners.len(),
             });
@@ -313,12 +313,12 @@ impl<'p> Pack<'p> {
         Ok(())
     }
 
-    /// Returns the checksum in the header, which identifies the pack.
+    /// Returns the checksum in the header, which identifies the model file.
     pub fn checksum(&self) -> u32 {
         self.checksum
     }
 
-    /// Returns the pack's scene. Its mesh is unpacked into `arena`.
+    /// Returns the model file's scene. Its mesh is unpacked into `arena`.
     pub fn entry<'a>(&self, arena: &'a mut Arena) -> Entry<'a>
     where
         'p: 'a,
@@ -365,7 +365,7 @@ fn corner(bytes: &[u8; CORNER]) -> Corner {
     }
 }
 
-/// Returns a face whose first corner is `first`, which is at most [`MAX_ALL_CORNERS`] in an accepted pack.
+/// Returns a face whose first corner is `first`, which is at most [`MAX_ALL_CORNERS`] in an accepted model file.
 fn face_at(bytes: &[u8; FACE], first: usize) -> Face {
     let (words, _) = bytes.as_chunks();
     Face {
@@ -388,7 +388,7 @@ mod tests {
 
     const SIDES: (u16, u16) = (7, 5);
 
-    /// Returns a pack with the catalogue's cube and a small texture.
+    /// Returns a model file with the catalogue's cube and a small texture.
     fn cube() -> Vec<u8> {
         let cube = Entry::parse("cube").unwrap().scene(&[]);
         let mut corners = cube.mesh.corners.to_vec();
@@ -411,11 +411,11 @@ mod tests {
         };
         let mut bytes = Vec::new();
         let checksum = parts.write(|part| bytes.extend_from_slice(part));
-        assert_eq!(Pack::parse(&bytes).unwrap().checksum(), checksum);
+        assert_eq!(ModelFile::parse(&bytes).unwrap().checksum(), checksum);
         bytes
     }
 
-    /// Returns a changed pack whose length and checksum match the change.
+    /// Returns a changed model file whose length and checksum match the change.
     fn forged(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
         let mut bytes = cube();
         change(&mut bytes);
@@ -429,9 +429,9 @@ mod tests {
     #[test]
     fn a_scene_comes_back() {
         let bytes = cube();
-        let pack = Pack::parse(&bytes).unwrap();
+        let model_file = ModelFile::parse(&bytes).unwrap();
         let mut arena = in_place::boxed!(Arena);
-        let entry = pack.entry(&mut arena);
+        let entry = model_file.entry(&mut arena);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
         let textures = entry.paint(&mut painted);
         let (scene, cube) = (
@@ -458,10 +458,10 @@ mod tests {
         for at in 0..good.len() {
             let mut bytes = good.clone();
             bytes[at] ^= 1 << (at % 8);
-            assert!(Pack::parse(&bytes).is_err(), "byte {at}");
+            assert!(ModelFile::parse(&bytes).is_err(), "byte {at}");
         }
         for len in 0..good.len() {
-            assert!(Pack::parse(&good[..len]).is_err(), "{len} bytes");
+            assert!(ModelFile::parse(&good[..len]).is_err(), "{len} bytes");
         }
     }
 
@@ -475,11 +475,11 @@ mod tests {
             forged(|bytes| bytes[at..at + new.len()].copy_from_slice(new))
         };
         for (bytes, why) in [
-            (put(0, b"c"), "does not begin as a pack"),
-            (Vec::new(), "does not begin as a pack"),
+            (put(0, b"c"), "does not begin as a model file"),
+            (Vec::new(), "does not begin as a model file"),
             (MAGIC.to_vec(), "8 bytes are too few"),
             (put(8, &[2]), "of version 2; this program reads version 1"),
-            (std::vec![0; MAX_BYTES], "does not begin as a pack"),
+            (std::vec![0; MAX_BYTES], "does not begin as a model file"),
             (std::vec![0; MAX_BYTES + 1], "has at most 524288"),
             (put(20, &[1, 16]), "4097 vertices; there is room for 4096"),
             (put(22, &[1, 96]), "24577 corners; there is room for 24576"),
@@ -519,14 +519,14 @@ mod tests {
             (put(FACES + 6, &[0, 0]), "the normal of face 0"),
             (put(FACES, &[5]), "its faces take 25 corners, and it has 24"),
         ] {
-            let error = Pack::parse(&bytes).unwrap_err().to_string();
+            let error = ModelFile::parse(&bytes).unwrap_err().to_string();
             assert!(error.contains(why), "{error}, and not {why}");
         }
         // The largest normal that rounding may produce is accepted: a squared length of 2^28 + 2^16.
-        Pack::parse(&put(FACES + 2, &[0, 64, 0, 1, 0, 0])).unwrap();
+        ModelFile::parse(&put(FACES + 2, &[0, 64, 0, 1, 0, 0])).unwrap();
         let mut long = cube();
         long.push(0);
-        let error = Pack::parse(&long).unwrap_err().to_string();
+        let error = ModelFile::parse(&long).unwrap_err().to_string();
         assert!(
             error.contains("header says 7793 bytes, and it has 7794"),
             "{error}"
@@ -571,9 +571,9 @@ mod tests {
         let mut bytes = Vec::new();
         parts.write(|part| bytes.extend_from_slice(part));
         assert!((MAX_BYTES * 3 / 4..=MAX_BYTES).contains(&bytes.len()));
-        let pack = Pack::parse(&bytes).unwrap();
+        let model_file = ModelFile::parse(&bytes).unwrap();
         let mut arena = in_place::boxed!(Arena);
-        let entry = pack.entry(&mut arena);
+        let entry = model_file.entry(&mut arena);
         let mut storage = in_place::boxed!(Storage);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
         let textures = entry.paint(&mut painted);

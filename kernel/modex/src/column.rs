@@ -82,7 +82,7 @@ pub(crate) fn check_row(x: u16, y: u16, len: u16) -> u16 {
     let more = len.wrapping_sub(1);
     assert!(
         x < WIDTH as u16 && y < HEIGHT as u16 && more < WIDTH as u16 - x,
-        "{len} pixels in a row at ({x}, {y}) are not in the picture"
+        "{len} pixels in a row at ({x}, {y}) are not in the frame"
     );
     x + more
 }

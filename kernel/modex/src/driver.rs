@@ -489,7 +489,7 @@ pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u
 /// Cold path: keeps the panic formatting out of the caller.
 #[cold]
 fn outside(x: u16, y: u16, len: u16, step: usize) -> ! {
-    panic!("{len} pixels, {step} bytes apart, at ({x}, {y}) are not in the picture")
+    panic!("{len} pixels, {step} bytes apart, at ({x}, {y}) are not in the frame")
 }
 
 fn page_start(page: usize) -> usize {

@@ -25,10 +25,10 @@ impl<'d, D: Destination> Window<'d, D> {
     /// If the columns leave the frame on either side, or if they would move by a distance that is
     /// not a multiple of four.
     pub fn new(destination: &'d mut D, columns: Range<u16>, to: u16) -> Self {
-        let (width, picture) = (columns.end.saturating_sub(columns.start), WIDTH as u16);
+        let (width, frame) = (columns.end.saturating_sub(columns.start), WIDTH as u16);
         assert!(
-            columns.end <= picture
-                && to <= picture - width
+            columns.end <= frame
+                && to <= frame - width
                 && columns.start.abs_diff(to).is_multiple_of(4),
             "columns {columns:?} cannot be shown from column {to} on"
         );

@@ -322,13 +322,13 @@ fn page(recorder: &Recorder, page: usize) -> PlanarBuffer {
 }
 
 #[test]
-fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
+fn a_page_after_any_order_of_frames_is_as_on_a_cleared_one() {
     let mut random = seeded::generator();
     let background: [u8; HEIGHT] = std::array::from_fn(|y| y as u8 | 1);
     let mut recorder = Recorder::new();
     let mut offscreen = Box::new(Offscreen::new());
     let mut card = ModeX::set(Counted::new(&mut recorder), &BLACK).unwrap();
-    for picture in 0..60 {
+    for frame in 0..60 {
         let columns: Vec<_> = (0..random.usize(0..40))
             .map(|_| {
                 let (x, y) = (random.u16(0..WIDTH as u16), random.u16(0..HEIGHT as u16));
@@ -378,14 +378,14 @@ fn a_page_after_any_order_of_pictures_is_as_on_a_cleared_one() {
         );
         assert_eq!(counts.flip.ports, 1);
         let shown = card.shown_page();
-        assert_eq!(shown, (picture + 1) % PAGES);
+        assert_eq!(shown, (frame + 1) % PAGES);
         assert_eq!(usize::from(card.start_address()), shown * PAGE_BYTES);
         let recorder = card.bus().inner();
         assert_eq!(
             recorder.registers[&(CRTC, START_ADDRESS_HIGH)],
             [0, 0x4B, 0x96][shown]
         );
-        assert!(page(recorder, shown) == expected, "picture {picture}");
+        assert!(page(recorder, shown) == expected, "frame {frame}");
         // The memory after the last page stays untouched.
         assert!(
             recorder
@@ -461,7 +461,7 @@ fn a_mode_set_without_a_beam_is_refused() {
 }
 
 #[test]
-#[should_panic(expected = "are not in the picture")]
+#[should_panic(expected = "are not in the frame")]
 fn a_column_beyond_the_page_is_refused() {
     PlanarBuffer::new().column(0, 200, 41, |column| column.fill(|| 0));
 }
@@ -564,7 +564,7 @@ fn a_row_of_a_line_takes_a_mask_a_plane_and_one_store_a_pixel() {
 }
 
 #[test]
-fn a_row_that_leaves_the_picture_is_refused() {
+fn a_row_that_leaves_the_frame_is_refused() {
     let refused = |x, y, len| {
         let ram = std::panic::catch_unwind(|| PlanarBuffer::new().row(x, y, len, || 0));
         let line = std::panic::catch_unwind(|| PlanarBuffer::new().line(x, y, len, |_| {}));

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use crate::{Change, FrameError, unframe};
+use crate::{Change, ChecksumError, without_checksum};
 
 /// A command, as a line contains it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,11 +12,11 @@ pub enum Command {
     Hold,
     /// `run`: let the demo run. A demo that was held keeps its settings, and moves as its scene does.
     Run,
-    /// `show PICTURE`: draw a frame on the next page, flip, and answer when the flip takes effect. A running
+    /// `show FRAME`: draw a frame on the next page, flip, and answer when the flip takes effect. A running
     /// demo is stopped first and keeps its settings.
-    Show(Picture),
-    /// `show PICTURE motion MOTION`: the same in reduced quality, as for a solid with this motion per tick.
-    ShowMoving(Picture, Motion),
+    Show(FrameName),
+    /// `show FRAME motion MOTION`: the same in reduced quality, as for a solid with this motion per tick.
+    ShowMoving(FrameName, Motion),
     /// `show at TICK`: the same with the frame that the demo's log gives for a tick. Scene, mapper and order
     /// are then those of that tick.
     ShowAt(u32),
@@ -51,9 +51,9 @@ pub enum Command {
 
 /// The name of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Picture {
+pub enum FrameName {
     /// `N`: the scene's default pose at tick N.
-    Frame(u32),
+    Number(u32),
     /// `pose YAW PITCH ROLL DISTANCE`, each in up to eight hex digits: the angles as 32-bit fractions of a
     /// turn, the distance in 16.16.
     Pose {
@@ -68,19 +68,19 @@ pub enum Picture {
     },
 }
 
-impl Picture {
+impl FrameName {
     /// Parses a name, as [`fmt::Display`] writes it.
     pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
-        let picture = match words.next()? {
+        let frame = match words.next()? {
             "pose" => Self::Pose {
                 yaw: hex(words.next()?)?,
                 pitch: hex(words.next()?)?,
                 roll: hex(words.next()?)?,
                 distance: hex(words.next()?)?,
             },
-            number => Self::Frame(decimal(number)?),
+            number => Self::Number(decimal(number)?),
         };
-        words.next().is_none().then_some(picture)
+        words.next().is_none().then_some(frame)
     }
 }
 
@@ -90,13 +90,13 @@ impl Picture {
 /// In reduced quality the motion decides which faces are drawn by a faster mapper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Motion {
-    /// Change of [`Picture::Pose::yaw`], a 32-bit fraction of a turn.
+    /// Change of [`FrameName::Pose::yaw`], a 32-bit fraction of a turn.
     pub yaw: u32,
-    /// Change of [`Picture::Pose::pitch`].
+    /// Change of [`FrameName::Pose::pitch`].
     pub pitch: u32,
-    /// Change of [`Picture::Pose::roll`].
+    /// Change of [`FrameName::Pose::roll`].
     pub roll: u32,
-    /// Change of [`Picture::Pose::distance`], in 16.16.
+    /// Change of [`FrameName::Pose::distance`], in 16.16.
     pub distance: u32,
 }
 
@@ -138,10 +138,10 @@ fn decimal(word: &str) -> Option<u32> {
     word.parse().ok().filter(|_| digits)
 }
 
-impl fmt::Display for Picture {
+impl fmt::Display for FrameName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Frame(frame) => write!(f, "{frame}"),
+            Self::Number(frame) => write!(f, "{frame}"),
             Self::Pose {
                 yaw,
                 pitch,
@@ -293,7 +293,7 @@ pub enum CommandError<'a> {
         takes: &'static str,
     },
     /// The line has a checksum, which is wrong.
-    Checksum(FrameError),
+    Checksum(ChecksumError),
 }
 
 impl fmt::Display for CommandError<'_> {
@@ -301,7 +301,7 @@ impl fmt::Display for CommandError<'_> {
         match self {
             Self::Unknown(word) => write!(
                 f,
-                "no command '{word}'; there are hold, run, show PICTURE, show PICTURE motion MOTION, show at TICK, scene NAME, \
+                "no command '{word}'; there are hold, run, show FRAME, show FRAME motion MOTION, show at TICK, scene NAME, \
                  mapper NAME, order NAME, steer CHANGE, steer TICK CHANGE, log, keys, dump, checksums, \
                  registers, counts, state, version, fail KIND, leave"
             ),
@@ -317,9 +317,9 @@ impl Command {
     /// # Errors
     /// The line is not a command.
     pub fn parse(line: &str) -> Result<Self, CommandError<'_>> {
-        let text = match unframe(line) {
+        let text = match without_checksum(line) {
             Ok(text) => text,
-            Err(FrameError::NoChecksum) => line,
+            Err(ChecksumError::NoChecksum) => line,
             Err(wrong) => return Err(CommandError::Checksum(wrong)),
         };
         let mut words = text.split_ascii_whitespace();
@@ -335,10 +335,10 @@ impl Command {
                 }
                 false => {
                     let mut motion = words.clone().skip_while(|word| *word != "motion");
-                    let picture = Picture::parse(words.take_while(|word| *word != "motion"));
-                    picture.and_then(|picture| match motion.next() {
-                        Some(_) => Some(Self::ShowMoving(picture, Motion::parse(motion)?)),
-                        None => Some(Self::Show(picture)),
+                    let frame = FrameName::parse(words.take_while(|word| *word != "motion"));
+                    frame.and_then(|frame| match motion.next() {
+                        Some(_) => Some(Self::ShowMoving(frame, Motion::parse(motion)?)),
+                        None => Some(Self::Show(frame)),
                     })
                 }
             };
@@ -406,8 +406,8 @@ impl fmt::Display for Command {
         match self {
             Self::Hold => f.write_str("hold"),
             Self::Run => f.write_str("run"),
-            Self::Show(picture) => write!(f, "show {picture}"),
-            Self::ShowMoving(picture, motion) => write!(f, "show {picture} motion {motion}"),
+            Self::Show(frame) => write!(f, "show {frame}"),
+            Self::ShowMoving(frame, motion) => write!(f, "show {frame} motion {motion}"),
             Self::ShowAt(tick) => write!(f, "show at {tick}"),
             Self::Steer(None, change) => write!(f, "steer {change}"),
             Self::Steer(Some(tick), change) => write!(f, "steer {tick} {change}"),
@@ -452,17 +452,17 @@ mod tests {
         let mut commands = std::vec![
             Command::Hold,
             Command::Run,
-            Command::Show(Picture::Frame(0)),
-            Command::Show(Picture::Frame(u32::MAX)),
-            Command::Show(Picture::Pose {
+            Command::Show(FrameName::Number(0)),
+            Command::Show(FrameName::Number(u32::MAX)),
+            Command::Show(FrameName::Pose {
                 yaw: u32::MAX,
                 pitch: 0,
                 roll: 0x0123_abcd,
                 distance: 1,
             }),
-            Command::ShowMoving(Picture::Frame(7), MOTION),
+            Command::ShowMoving(FrameName::Number(7), MOTION),
             Command::ShowMoving(
-                Picture::Pose {
+                FrameName::Pose {
                     yaw: 1,
                     pitch: 2,
                     roll: 3,

@@ -1,12 +1,12 @@
 //! Dumps: the content of a card as text that `diff` can compare.
 //!
 //! ```text
-//! crystal-ball dump 4
+//! crystal-ball dump 5
 //! content page
 //! scene ball
-//! pack none
+//! model none
 //! mapper shifts
-//! picture 480
+//! frame 480
 //! motion none
 //! start 4b00
 //! size 320 240
@@ -23,23 +23,25 @@
 //! a line of a page is a line of the dump. Pixel i of a line is in plane i & 3 at the line's address plus i /
 //! 4; the last line has the sixteen addresses that remain.
 //!
-//! The pack is `none` for a built-in scene. Otherwise it is the checksum, in eight hex digits, of the pack
-//! that contains the model. Dumps with different packs show different models, even though their scenes have
+//! The model file is `none` for a built-in scene. Otherwise it is the checksum, in eight hex digits, of the model file
+//! that contains the model. Dumps with different model files show different models, even though their scenes have
 //! the same name.
 //!
 //! The header names the frame so that `scene`, `mapper` and `show` draw it again. If some of its faces were
 //! drawn in reduced quality, `motion` is the [`Motion`] that decided which; otherwise it is `none`. Before
-//! the first frame `mapper`, `picture` and `motion` are `none`. Version 3 had no line `motion` and marked
-//! reduced quality by a `~` behind the mapper's name.
+//! the first frame `mapper`, `frame` and `motion` are `none`.
+//!
+//! Version 4 had the words `pack` and `picture` for `model` and `frame`. Version 3 also had no line `motion`, and
+//! marked reduced quality by a `~` behind the mapper's name.
 //!
 //! Two dumps of the same frame on different pages differ only in their `start`.
 
 use core::fmt;
 
-use crate::{Checksum, Content, Motion, Picture, Word};
+use crate::{Checksum, Content, FrameName, Motion, Word};
 
 /// Version of the format, in a dump's first line.
-pub const VERSION: u32 = 4;
+pub const VERSION: u32 = 5;
 /// Start of a dump's first line; the version follows.
 pub const MAGIC: &str = "crystal-ball dump";
 /// Addresses in each plane.
@@ -56,12 +58,12 @@ pub struct Header<S> {
     pub content: Content,
     /// The scene's name, a word.
     pub scene: S,
-    /// The checksum of the pack that contains the scene; `None` for a built-in scene.
-    pub pack: Option<u32>,
+    /// The checksum of the model file that contains the scene; `None` for a built-in scene.
+    pub model_file: Option<u32>,
     /// The name of the mapper that drew the frame; `None` before the first frame.
     pub mapper: Option<Word>,
     /// The frame on the screen; `None` before the first frame.
-    pub picture: Option<Picture>,
+    pub frame: Option<FrameName>,
     /// The motion that decided which faces are drawn in reduced quality; `None` if all have full quality.
     pub motion: Option<Motion>,
     /// The start address: where the displayed page begins in each plane.
@@ -178,9 +180,9 @@ pub fn write<S: fmt::Display>(
     let Header {
         content,
         scene,
-        pack,
+        model_file,
         mapper,
-        picture,
+        frame,
         motion,
         start,
         width,
@@ -189,12 +191,12 @@ pub fn write<S: fmt::Display>(
     put(format_args!("{MAGIC} {VERSION}"));
     put(format_args!("content {content}"));
     put(format_args!("scene {scene}"));
-    match pack {
-        Some(pack) => put(format_args!("pack {pack:08x}")),
-        None => put(format_args!("pack none")),
+    match model_file {
+        Some(model_file) => put(format_args!("model {model_file:08x}")),
+        None => put(format_args!("model none")),
     }
     put(format_args!("mapper {}", OrNone(mapper)));
-    put(format_args!("picture {}", OrNone(picture)));
+    put(format_args!("frame {}", OrNone(frame)));
     put(format_args!("motion {}", OrNone(motion)));
     put(format_args!("start {start:04x}"));
     put(format_args!("size {width} {height}"));
@@ -325,9 +327,9 @@ mod tests {
         Header {
             content,
             scene: "ball",
-            pack: None,
+            model_file: None,
             mapper: Word::new("exact"),
-            picture: Some(Picture::Frame(u32::MAX)),
+            frame: Some(FrameName::Number(u32::MAX)),
             motion: None,
             start: 0x4B00,
             width: 320,
@@ -354,10 +356,10 @@ mod tests {
         ] {
             let lines = lines(content);
             assert_eq!(lines.len(), 9 + 16 + rows + 1);
-            assert_eq!(lines[0], "crystal-ball dump 4");
+            assert_eq!(lines[0], "crystal-ball dump 5");
             assert_eq!(
                 lines[4..7],
-                ["mapper exact", "picture 4294967295", "motion none"]
+                ["mapper exact", "frame 4294967295", "motion none"]
             );
             assert!(lines[24].starts_with("palette f0 3f0001 3f0001"));
             assert!(lines[rows + 24].starts_with(last), "{}", lines[rows + 24]);
@@ -369,7 +371,7 @@ mod tests {
                 });
                 let sent = String::from_utf8(sent).unwrap();
                 assert_eq!(
-                    crate::unframe(sent.trim_end()),
+                    crate::without_checksum(sent.trim_end()),
                     Ok(line.as_str()),
                     "it was cut"
                 );

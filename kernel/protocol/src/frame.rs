@@ -109,7 +109,7 @@ pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
 
 /// Why a line's checksum was not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FrameError {
+pub enum ChecksumError {
     /// The line has no ` *xxxxxxxx` at its end.
     NoChecksum,
     /// The checksum does not match the text.
@@ -121,7 +121,7 @@ pub enum FrameError {
     },
 }
 
-impl fmt::Display for FrameError {
+impl fmt::Display for ChecksumError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoChecksum => f.write_str("the line does not end in a checksum"),
@@ -133,24 +133,24 @@ impl fmt::Display for FrameError {
     }
 }
 
-impl core::error::Error for FrameError {}
+impl core::error::Error for ChecksumError {}
 
 /// Returns the text of a line that ends in its checksum.
 ///
 /// # Errors
 /// The checksum is missing or wrong.
-pub fn unframe(line: &str) -> Result<&str, FrameError> {
-    let (text, digits) = line.rsplit_once(" *").ok_or(FrameError::NoChecksum)?;
+pub fn without_checksum(line: &str) -> Result<&str, ChecksumError> {
+    let (text, digits) = line.rsplit_once(" *").ok_or(ChecksumError::NoChecksum)?;
     let lower_hex = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);
     if digits.len() != 8 || !digits.bytes().all(lower_hex) {
-        return Err(FrameError::NoChecksum);
+        return Err(ChecksumError::NoChecksum);
     }
-    let said = u32::from_str_radix(digits, 16).map_err(|_| FrameError::NoChecksum)?;
+    let said = u32::from_str_radix(digits, 16).map_err(|_| ChecksumError::NoChecksum)?;
     let computed = CRC.checksum(text.as_bytes());
     if said == computed {
         Ok(text)
     } else {
-        Err(FrameError::WrongChecksum { said, computed })
+        Err(ChecksumError::WrongChecksum { said, computed })
     }
 }
 
@@ -177,7 +177,7 @@ mod tests {
                 .chars()
                 .map(|c| if (' '..='~').contains(&c) { c } else { '?' })
                 .collect();
-            assert_eq!(unframe(line.trim_end()), Ok(printable.as_str()));
+            assert_eq!(without_checksum(line.trim_end()), Ok(printable.as_str()));
         }
     }
 
@@ -185,7 +185,7 @@ mod tests {
     fn a_long_line_is_cut_and_still_right() {
         let line = line(&"x".repeat(2 * MAX_LINE));
         assert_eq!(line.len(), MAX_LINE + 1);
-        assert!(unframe(line.trim_end()).is_ok());
+        assert!(without_checksum(line.trim_end()).is_ok());
     }
 
     #[test]
@@ -199,10 +199,13 @@ mod tests {
                 let Ok(bad) = String::from_utf8(bytes) else {
                     continue;
                 };
-                assert!(unframe(&bad).is_err(), "{bad:?} passed");
+                assert!(without_checksum(&bad).is_err(), "{bad:?} passed");
             }
         }
-        assert_eq!(unframe("ok"), Err(FrameError::NoChecksum));
-        assert_eq!(unframe("ok *+1234567"), Err(FrameError::NoChecksum));
+        assert_eq!(without_checksum("ok"), Err(ChecksumError::NoChecksum));
+        assert_eq!(
+            without_checksum("ok *+1234567"),
+            Err(ChecksumError::NoChecksum)
+        );
     }
 }

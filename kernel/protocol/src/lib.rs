@@ -39,17 +39,17 @@
 //! | `dump`, `dump all` | a [`dump`] |
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
-//! | `counts` | `picture polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
-//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `picture 480`, `motion none` (a motion if the frame has faces in reduced quality), `drawn shifts` (the frame's mapper; `none` without a frame), `page 1 start 4b00`, `serial overruns 0 damaged 0 full 0` ([`Reception`]) |
-//! | `version` | `crystal-ball 0.1.0 protocol 6 dump 4` |
+//! | `counts` | `frame polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
+//! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `frame 480`, `motion none` (a motion if the frame has faces in reduced quality), `drawn shifts` (the frame's mapper; `none` without a frame), `page 1 start 4b00`, `serial overruns 0 damaged 0 full 0` ([`Reception`]) |
+//! | `version` | `crystal-ball 0.1.0 protocol 7 dump 5` |
 //! | `fail KIND` | no answer: the kernel fails in the named way ([`Fault`]) |
 //! | `leave` | no lines; QEMU ends after the `ok` |
 //!
 //! Commands that arrive during an answer are answered after it, in order. The kernel waits for a host that
 //! does not read. Between answers the kernel also sends lines unasked:
 //!
-//! - `hello crystal-ball VERSION protocol 6`: the boot loader has started the kernel;
-//! - `loaded pack 1a2b3c4d`, with the pack's checksum, or `refused pack: ...`, with the reason: right after
+//! - `hello crystal-ball VERSION protocol 7`: the boot loader has started the kernel;
+//! - `loaded model 1a2b3c4d`, with the model file's checksum, or `refused model: ...`, with the reason: right after
 //!   `hello`, if the boot loader has loaded a ramdisk;
 //! - `running`: the first frame is on the screen;
 //! - `panic ...`, `exception ...`, `adapter ...`, and lines with details, then [`END_OF_REPORT`].
@@ -63,23 +63,23 @@ mod frame;
 mod lines;
 
 pub use action::{Action, Change};
-pub use command::{Command, CommandError, Content, Fault, Motion, Picture, Setting, Word};
-pub use frame::{Checksum, FrameError, unframe, write_line};
+pub use command::{Command, CommandError, Content, Fault, FrameName, Motion, Setting, Word};
+pub use frame::{Checksum, ChecksumError, without_checksum, write_line};
 pub use lines::{Lines, Noise};
 
 /// Ticks in a second of the machine's time. The demo draws a frame for each tick, as far as the machine keeps
 /// up.
 pub const TICKS_PER_SECOND: u32 = 60;
 /// The protocol's version, which the kernel's first line contains.
-pub const PROTOCOL: u32 = 6;
+pub const PROTOCOL: u32 = 7;
 /// Longest line in bytes, with its checksum and without its line end. 320 pixels of a dump and their label
 /// are 657 bytes long.
 pub const MAX_LINE: usize = 700;
 /// First word of the kernel's first line.
 pub const HELLO: &str = "hello";
-/// First word of the line that says that the kernel has accepted the ramdisk's pack.
+/// First word of the line that says that the kernel has accepted the ramdisk's model file.
 pub const LOADED: &str = "loaded";
-/// First word of the line that says that the kernel has refused the ramdisk's pack.
+/// First word of the line that says that the kernel has refused the ramdisk's model file.
 pub const REFUSED: &str = "refused";
 /// The line that says that the first frame is on the screen.
 pub const RUNNING: &str = "running";

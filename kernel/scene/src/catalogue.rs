@@ -82,7 +82,7 @@ mod tests {
     }
 
     #[test]
-    fn every_picture_is_whole_and_shows_its_scene() {
+    fn every_frame_is_whole_and_shows_its_scene() {
         for entry in &CATALOGUE {
             staged(entry.name, |entry, stage| {
                 for tick in TICKS {

@@ -136,7 +136,7 @@ fn compare(by: Mapper, cases: usize) -> [u32; 3] {
 }
 
 #[test]
-fn a_turned_polygon_gives_the_turned_picture() {
+fn a_turned_polygon_gives_the_turned_frame() {
     let [pixels, others, ties] = compare(Mapper::Exact, 150);
     assert!(!seeded::is_whole() || pixels > 500_000 && ties > 100);
     assert_eq!(others, 0);

@@ -88,20 +88,20 @@ impl<'a> Emulated<'a> {
             counts == again,
             "the accesses of {mapper} in the order {order} do not repeat: {counts:?}, {again:?}"
         );
-        let pictures = u64::from(work.pictures());
+        let frames = u64::from(work.frames());
         let each = |tally: Tally| Tally {
-            ports: tally.ports / pictures,
-            map_mask: tally.map_mask / pictures,
-            stores: tally.stores / pictures,
-            bytes: tally.bytes / pictures,
-            loads: tally.loads / pictures,
+            ports: tally.ports / frames,
+            map_mask: tally.map_mask / frames,
+            stores: tally.stores / frames,
+            bytes: tally.bytes / frames,
+            loads: tally.loads / frames,
         };
         let loads: u64 = counts.named().iter().map(|(_, tally)| tally.loads).sum();
         Ok(Accesses {
             draw: each(counts.draw),
             erase: each(counts.erase),
             flip: each(counts.flip),
-            loads: loads / pictures,
+            loads: loads / frames,
         })
     }
 

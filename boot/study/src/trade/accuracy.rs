@@ -93,12 +93,12 @@ pub fn errors(
 }
 
 /// Draws a frame of a subject with a mapper, and returns its pixels.
-pub fn picture(subject: &Subject<'_>, number: usize, mapper: Mapper, jobs: &mut Jobs) -> Vec<u8> {
+pub fn frame(subject: &Subject<'_>, number: usize, mapper: Mapper, jobs: &mut Jobs) -> Vec<u8> {
     let mut page = Box::new(PlanarBuffer::new());
     page.clear(&subject.background);
     let order = Order::default();
     let mut renderer = Renderer::new(jobs, &subject.textures, &mut *page, mapper, order);
-    for face in &subject.pictures[number] {
+    for face in &subject.frames[number] {
         renderer.face(&face.face());
     }
     renderer.finish();
@@ -112,7 +112,7 @@ pub fn measure(subject: &Subject<'_>, mapper: Mapper, jobs: &mut Jobs) -> Accura
         psnr: f64::INFINITY,
         ..Accuracy::default()
     };
-    for (number, faces) in subject.pictures.iter().enumerate() {
+    for (number, faces) in subject.frames.iter().enumerate() {
         for face in faces {
             let texture = subject.texture(face.face().texture);
             errors(mapper, face, texture, |_, error, other| {
@@ -121,7 +121,7 @@ pub fn measure(subject: &Subject<'_>, mapper: Mapper, jobs: &mut Jobs) -> Accura
             });
         }
         let [drawn, exact] = [mapper, Mapper::Exact].map(|mapper| {
-            let pixels = picture(subject, number, mapper, jobs);
+            let pixels = frame(subject, number, mapper, jobs);
             let colours = pixels.iter().map(|&i| subject.palette[usize::from(i)]);
             colours.collect::<Vec<_>>()
         });
@@ -156,7 +156,7 @@ mod tests {
     fn an_affine_column_errs_as_the_formula_says() {
         let affine = Mapper::parse("affine").unwrap();
         with("tilted", 0, |subject| {
-            for faces in &subject.pictures {
+            for faces in &subject.frames {
                 let face = &faces[0];
                 let texture = subject.texture(face.face().texture);
                 let mut worst: f64 = 0.0;

@@ -30,7 +30,7 @@ pub enum What {
     /// Drawing alone, of jobs made beforehand.
     Loops,
     /// A whole frame: making its jobs and drawing them.
-    Picture,
+    Frame,
 }
 
 /// The way in which the bare loop visits the pixels.
@@ -112,7 +112,7 @@ pub struct Costs {
     /// The cost of drawing alone.
     pub loops: Cost,
     /// The cost of the whole frame.
-    pub picture: Cost,
+    pub frame: Cost,
     /// The cost of drawing alone with the portable reference, for a loop whose instructions not every CPU
     /// has.
     pub twin: Option<Cost>,
@@ -320,7 +320,7 @@ fn contestants<'a>(
                     What::Loops => Box::new(move |arena| {
                         draw(&jobs, mapper, order, &subject.textures, &mut arena.page);
                     }),
-                    What::Picture => Box::new(move |arena| {
+                    What::Frame => Box::new(move |arena| {
                         let Arena { page, jobs } = arena;
                         let textures = &subject.textures;
                         let mut renderer =
@@ -418,8 +418,8 @@ pub fn measure(
     if !all.contains(&packed) {
         all.push(packed);
     }
-    let faces = &subject.pictures[number];
-    let contestants = contestants(&all, faces, subject, &[What::Loops, What::Picture]);
+    let faces = &subject.frames[number];
+    let contestants = contestants(&all, faces, subject, &[What::Loops, What::Frame]);
     let raced = race(&contestants, effort);
     let times = Times(contestants.iter().map(|c| c.key).zip(raced).collect());
     let mut costs = Vec::new();
@@ -429,7 +429,7 @@ pub fn measure(
                 mapper,
                 order,
                 loops: times.cost(mapper, order, What::Loops),
-                picture: times.cost(mapper, order, What::Picture),
+                frame: times.cost(mapper, order, What::Frame),
                 twin: beyond_baseline(mapper).and_then(|twin| {
                     let key = (Who::Twin(twin), order, What::Loops);
                     times.cost_of(key, Who::bare(mapper))
@@ -614,7 +614,7 @@ mod tests {
             for costs in &costs {
                 let twin = beyond_baseline(costs.mapper);
                 assert_eq!(costs.twin.is_some(), twin.is_some());
-                for cost in [costs.loops, costs.picture] {
+                for cost in [costs.loops, costs.frame] {
                     for spread in [cost.time, cost.to_bare, cost.to_packed] {
                         assert!(spread.least > 0.0 && spread.most.is_finite(), "{costs:?}");
                     }
@@ -633,11 +633,11 @@ mod tests {
     /// Checks that the timed code draws the right pixels: mappers draw the renderer's frame, and bare loops
     /// draw as many pixels.
     #[test]
-    fn contestants_draw_whole_pictures() {
+    fn contestants_draw_whole_frames() {
         with("tilted", 0, |subject| {
             let mappers = some();
-            let faces = &subject.pictures[1];
-            let all = contestants(&mappers, faces, subject, &[What::Loops, What::Picture]);
+            let faces = &subject.frames[1];
+            let all = contestants(&mappers, faces, subject, &[What::Loops, What::Frame]);
             let twins = mappers
                 .iter()
                 .filter(|&&m| beyond_baseline(m).is_some())

@@ -141,21 +141,21 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
         over(host.time("linear-16", Order::Planes), best),
     );
     add(
-        "`within-1/2` over `affine` on the ball, whole pictures",
+        "`within-1/2` over `affine` on the ball, whole frames",
         1.25,
         true,
         over(
-            host.picture("ball", "within-1/2"),
-            host.picture("ball", "affine"),
+            host.frame("ball", "within-1/2"),
+            host.frame("ball", "affine"),
         ),
     );
     add(
-        "`exact` over `within-1/2` on the grazing floor, whole pictures",
+        "`exact` over `within-1/2` on the grazing floor, whole frames",
         3.0,
         false,
         over(
-            host.picture("grazing-16", "exact"),
-            host.picture("grazing-16", "within-1/2"),
+            host.frame("grazing-16", "exact"),
+            host.frame("grazing-16", "within-1/2"),
         ),
     );
     let masks = |order| -> Figure {
@@ -163,7 +163,7 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
         let mut rows = rows.filter(|row| row.mapper == Mapper::default() && row.order == order);
         Some(rows.next()?.accesses.draw.map_mask as f64)
     };
-    let what = "Map Mask writes of a picture of the ball by planes, drawing";
+    let what = "Map Mask writes of a frame of the ball by planes, drawing";
     add(what, 4.0, true, masks(Order::Planes));
     let frame = |ratio: fn(&Row) -> f64| -> Figure {
         let rows = of(measured?, Cpu::Baseline).iter().map(ratio);
@@ -220,12 +220,12 @@ impl Host<'_> {
     }
 
     /// Returns the time of a scene's frame, in the cheaper of the orders.
-    fn picture(&self, scene: &str, mapper: impl Display) -> Figure {
+    fn frame(&self, scene: &str, mapper: impl Display) -> Figure {
         let table = self.tables.iter().find(|table| table.scene == scene)?;
         let row = table
             .rows
             .iter()
             .find(|row| row.name() == mapper.to_string())?;
-        Some(row.best().picture.time.median)
+        Some(row.best().frame.time.median)
     }
 }

@@ -34,7 +34,7 @@ pub struct Shown {
     /// The mappers' names.
     pub mappers: Vec<String>,
     /// The frame.
-    pub picture: Indexed,
+    pub image: Indexed,
     /// The map of the frame's errors.
     pub heat: Screen,
     /// The mappers' accuracy on the frame.
@@ -60,15 +60,15 @@ impl Gallery {
             let colours = pixels.iter().map(|&i| subject.palette[usize::from(i)]);
             colours.collect::<Vec<_>>()
         };
-        let exact = colours(&accuracy::picture(subject, 0, Mapper::Exact, jobs));
+        let exact = colours(&accuracy::frame(subject, 0, Mapper::Exact, jobs));
         for &mapper in mappers {
-            let pixels = accuracy::picture(subject, 0, mapper, jobs);
+            let pixels = accuracy::frame(subject, 0, mapper, jobs);
             let mut accuracy = Accuracy {
                 psnr: super::stats::psnr(&colours(&pixels), &exact),
                 ..Accuracy::default()
             };
             let mut heat = vec![NOTHING; WIDTH * HEIGHT];
-            for face in &subject.pictures[0] {
+            for face in &subject.frames[0] {
                 let texture = subject.texture(face.face().texture);
                 accuracy::errors(mapper, face, texture, |(x, y), error, other| {
                     heat[usize::from(y) * WIDTH + usize::from(x)] = colour(error);
@@ -77,14 +77,14 @@ impl Gallery {
                 });
             }
             let alike =
-                |s: &&mut Shown| s.picture.pixels == pixels && s.accuracy.errors == accuracy.errors;
+                |s: &&mut Shown| s.image.pixels == pixels && s.accuracy.errors == accuracy.errors;
             if let Some(same) = shown.iter_mut().find(alike) {
                 same.mappers.push(mapper.to_string());
                 continue;
             }
             shown.push(Shown {
                 mappers: vec![mapper.to_string()],
-                picture: Indexed {
+                image: Indexed {
                     width: WIDTH,
                     height: HEIGHT,
                     palette: subject.palette.map(|c| c.map(|part| part >> 2)).to_vec(),
@@ -118,7 +118,7 @@ impl Gallery {
         let _ = write!(
             page,
             "<section class=\"card\">\n<h2>The scene <code>{scene}</code></h2>\n<p>{about}. \
-             Mappers that are alike in every pixel share a picture.</p>\n<div class=\"gallery\">\n"
+             Mappers that are alike in every pixel share a frame.</p>\n<div class=\"gallery\">\n"
         );
         for shown in &self.shown {
             let names = shown.mappers.iter().map(|name| escape(name));
@@ -315,7 +315,7 @@ mod tests {
             about: &["a <b>".into()],
             plots: &[("caption".into(), "<svg></svg>".into())],
             galleries: std::slice::from_ref(&gallery),
-            folder: "pictures",
+            folder: "images",
             tables: &[(
                 "t".into(),
                 "about".into(),
@@ -326,7 +326,7 @@ mod tests {
         .html();
         for shown in &gallery.shown {
             for map in [false, true] {
-                let name = format!("\"pictures/{}\"", gallery.file(shown, map));
+                let name = format!("\"images/{}\"", gallery.file(shown, map));
                 assert!(html.contains(&name), "{name}");
             }
         }

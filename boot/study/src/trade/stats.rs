@@ -156,7 +156,7 @@ impl Errors {
 /// # Panics
 /// If the frames have different numbers of pixels.
 pub fn psnr(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
-    assert_eq!(a.len(), b.len(), "one picture has more pixels");
+    assert_eq!(a.len(), b.len(), "one frame has more pixels");
     let pairs = a.as_flattened().iter().zip(b.as_flattened());
     let squares: f64 = pairs.map(|(&a, &b)| f64::from(a.abs_diff(b)).powi(2)).sum();
     let parts = 3.0 * a.len() as f64;

@@ -61,7 +61,7 @@ pub struct Subject<'a> {
     /// A line about the scene.
     pub about: String,
     /// The faces of each frame.
-    pub pictures: Vec<Vec<Owned>>,
+    pub frames: Vec<Vec<Owned>>,
     /// The textures of the faces, lit.
     pub textures: Vec<Texture<'a>>,
     /// The DAC's colours, with 8 bits a component.
@@ -72,19 +72,19 @@ pub struct Subject<'a> {
 
 impl<'a> Subject<'a> {
     fn new(name: &'static str, about: String, stage: &'a mut Stage<'_>, poses: &[Pose]) -> Self {
-        let mut pictures = Vec::new();
+        let mut frames = Vec::new();
         for pose in poses {
             let mut faces = Vec::new();
             stage.polygons(pose, |_, face| faces.extend(face.as_ref().map(Owned::new)));
-            pictures.push(faces);
+            frames.push(faces);
         }
         let stage: &'a Stage<'_> = stage;
-        let numbers = pictures.iter().flatten().map(|face| face.texture);
+        let numbers = frames.iter().flatten().map(|face| face.texture);
         let most = numbers.max().unwrap_or(0);
         Self {
             name,
             about,
-            pictures,
+            frames,
             textures: (0..=most).map(|number| stage.surface(number)).collect(),
             palette: stage.palette().map(|colour| colour.map(vga::widen)),
             background: *stage.background(),
@@ -234,7 +234,7 @@ mod tests {
         for name in names() {
             let faces = |subject: &Subject<'_>| {
                 assert_eq!(subject.name, name);
-                let faces = subject.pictures.iter().flatten();
+                let faces = subject.frames.iter().flatten();
                 faces.map(|face| face.polygon.clone()).collect::<Vec<_>>()
             };
             let once = with(name, 7, faces);
@@ -247,7 +247,7 @@ mod tests {
     fn random_polygons_look_at_the_viewer_and_depend_on_the_seed() {
         let polygons = |seed| {
             with(RANDOM, seed, |subject| {
-                let faces = &subject.pictures[0];
+                let faces = &subject.frames[0];
                 // A few are off the screen, but none is lost because it faces away.
                 assert!(faces.len() > POLYGONS * 9 / 10, "{}", faces.len());
                 faces

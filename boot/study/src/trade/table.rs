@@ -31,7 +31,7 @@ impl Row {
     /// # Panics
     /// If the row has no costs.
     pub fn best(&self) -> &Costs {
-        let cost = |costs: &&Costs| costs.picture.time.median;
+        let cost = |costs: &&Costs| costs.frame.time.median;
         let best = self.costs.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
         best.expect("there is an order")
     }
@@ -84,7 +84,7 @@ impl Table {
             };
             let costs = first.costs.iter().enumerate().map(|(k, costs)| Costs {
                 loops: mean(k, |costs| costs.loops),
-                picture: mean(k, |costs| costs.picture),
+                frame: mean(k, |costs| costs.frame),
                 twin: costs
                     .twin
                     .map(|_| mean(k, |costs| costs.twin.unwrap_or(costs.loops))),
@@ -115,9 +115,9 @@ impl Table {
         head.extend([
             "loops, polygons".into(),
             "loops, planes".into(),
-            "picture, polygons".into(),
-            "picture, planes".into(),
-            "picture to packed".into(),
+            "frame, polygons".into(),
+            "frame, planes".into(),
+            "frame to packed".into(),
         ]);
         let mut cells = vec![head];
         for row in &self.rows {
@@ -130,7 +130,7 @@ impl Table {
                 percent(accuracy.other_share()),
                 decibels(accuracy.psnr),
             ];
-            let parts: [fn(&Costs) -> Cost; 2] = [|costs| costs.loops, |costs| costs.picture];
+            let parts: [fn(&Costs) -> Cost; 2] = [|costs| costs.loops, |costs| costs.frame];
             for part in parts {
                 line.extend(row.costs.iter().map(|costs| {
                     let Cost { time, to_bare, .. } = part(costs);
@@ -142,7 +142,7 @@ impl Table {
                     )
                 }));
             }
-            line.push(format!("{:.2}", row.best().picture.to_packed.median));
+            line.push(format!("{:.2}", row.best().frame.to_packed.median));
             let twins = row.costs.iter().enumerate();
             for (k, twin) in twins.filter_map(|(k, costs)| Some((k, costs.twin?))) {
                 // The columns of the loops follow the six columns of the name and the accuracy.
@@ -218,7 +218,7 @@ pub fn csv(tables: &[Table]) -> String {
     let mut text =
         String::from("scene,mapper,order,unit,pixels,largest_error,p99_error,mean_error");
     text += ",other_texels,psnr_db";
-    for what in ["loops", "picture"] {
+    for what in ["loops", "frame"] {
         for part in ["time", "time_to_bare", "time_to_packed"] {
             for of in ["", "_least", "_most"] {
                 let _ = write!(text, ",{what}_{part}{of}");
@@ -245,7 +245,7 @@ pub fn csv(tables: &[Table]) -> String {
                     accuracy.other_texels,
                     accuracy.psnr,
                 );
-                for cost in [costs.loops, costs.picture] {
+                for cost in [costs.loops, costs.frame] {
                     for spread in [cost.time, cost.to_bare, cost.to_packed] {
                         let Spread {
                             median,
@@ -326,7 +326,7 @@ pub(super) mod tests {
                 mapper,
                 order,
                 loops: cost(1.0 + i as f64),
-                picture: cost(2.0 + i as f64 * scale),
+                frame: cost(2.0 + i as f64 * scale),
                 twin: (i % 2 == 0).then(|| cost(7.0)),
             });
             rows.push(Row {
@@ -381,8 +381,8 @@ pub(super) mod tests {
                 row.accuracy.errors.largest(),
                 of(1).accuracy.errors.largest()
             );
-            let product = of(0).costs[0].picture.time.median * of(1).costs[0].picture.time.median;
-            let mean = row.costs[0].picture.time.median;
+            let product = of(0).costs[0].frame.time.median * of(1).costs[0].frame.time.median;
+            let mean = row.costs[0].frame.time.median;
             assert!((mean * mean / product - 1.0).abs() < 1e-9);
         }
     }

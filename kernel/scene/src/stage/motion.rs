@@ -41,7 +41,7 @@ use crate::trig::sin;
 use crate::{FOCAL_LENGTH, Pose, Vec3};
 
 /// Images a second that the eye still sees one by one, not as motion. (P. Read and M.-P. Meyer, Restoration
-/// of Motion Picture Film, 2000: 10 to 12.)
+/// of Motion FrameName Film, 2000: 10 to 12.)
 pub const STEPS_A_SECOND: u32 = 12;
 
 /// Pixels from one sample to the next, in x and y.
@@ -436,7 +436,7 @@ mod tests {
             }
             let (middle, most) = (pixels[pixels.len() / 2], ends[ends.len() / 2]);
             std::println!(
-                "{}: {middle:.2} pixels a picture ({:.2} to {:.2}), the sweet spot is 0.20 to {most:.1}",
+                "{}: {middle:.2} pixels a frame ({:.2} to {:.2}), the sweet spot is 0.20 to {most:.1}",
                 entry.name,
                 pixels[0],
                 pixels[pixels.len() - 1]
@@ -446,7 +446,7 @@ mod tests {
 
     /// If a frame lasts more ticks, steps come more slowly, and the least motion grows.
     #[test]
-    fn the_sweet_spot_scales_with_the_rate_of_pictures() {
+    fn the_sweet_spot_scales_with_the_rate_of_frames() {
         let motion = Motion {
             pixels: 1 << 16,
             part: 1 << 14,

@@ -1,4 +1,4 @@
-//! The column loops alone: a picture of 320 columns of 200 pixels in RAM.
+//! The column loops alone: a frame of 320 columns of 200 pixels in RAM.
 //!
 //! `cargo bench -p texmap` prints cycles a pixel, and what they are of the bare loop's in the same
 //! order and of the packed loop's in x order. Times are ratios within one run: the rounds go

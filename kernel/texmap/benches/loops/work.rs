@@ -7,11 +7,11 @@ use texmap::coverage::Axis;
 use texmap::loops::Loop;
 use texmap::{Job, Rows, Style, Texture, Tolerance, Walk, plane};
 
-/// Columns of the picture.
+/// Columns of the frame.
 pub const COLUMNS: u16 = 320;
 /// Pixels in each.
 pub const LEN: u16 = 200;
-/// Pixels of the picture.
+/// Pixels of the frame.
 pub const PIXELS: u32 = COLUMNS as u32 * LEN as u32;
 
 /// Texels across and down the texture.
@@ -29,7 +29,7 @@ pub fn texture(texels: &[u8]) -> Texture<'_> {
     Texture::padded(texels, SIDE, SIDE).expect("SIDE x SIDE texels")
 }
 
-/// Steps of 0.20 and 0.27 texel a pixel: the picture lies aslant in the texture and almost fills
+/// Steps of 0.20 and 0.27 texel a pixel: the frame lies aslant in the texture and almost fills
 /// it.
 const STEPS: (i32, i32) = (13_235, 17_695);
 
@@ -44,7 +44,7 @@ pub fn down(x: u16) -> Affine {
     }
 }
 
-/// The walk along row `y` of the same picture.
+/// The walk along row `y` of the same frame.
 pub fn along(y: u16) -> Affine {
     let (first, y, (du, dv)) = (down(0), i32::from(y), STEPS);
     Affine {
@@ -75,7 +75,7 @@ impl Order {
     }
 }
 
-/// What draws the picture.
+/// What draws the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
     /// Loads a texel and stores it, and steps nothing.
@@ -90,7 +90,7 @@ pub enum By {
     Rows(Rows),
 }
 
-/// Draws the picture.
+/// Draws the frame.
 pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order) {
     match by {
         By::Bare => {
@@ -134,7 +134,7 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
 pub const PIECES: [u16; 4] = [8, 16, 32, 64];
 
 /// The forms down column `x`: depth falls by a part in 2^`lean` of its first value with every
-/// pixel, and the texture begins to pass at a part of the picture's steps.
+/// pixel, and the texture begins to pass at a part of the frame's steps.
 fn leaning(x: u16, part: i64, lean: u32) -> plane::Walk {
     let depth = 1 << 44;
     let fall = -(depth >> lean);

@@ -27,8 +27,8 @@ fn scene(golden: &Golden) -> &'static Entry<'static> {
 
 /// The pose of a golden's last frame.
 fn pose(golden: &Golden) -> Pose {
-    let picture = golden.show.last().expect("a golden shows something");
-    demo::pose(scene(golden), *picture).expect("a golden's pose is legal")
+    let frame = golden.show.last().expect("a golden shows something");
+    demo::pose(scene(golden), *frame).expect("a golden's pose is legal")
 }
 
 /// What the definitions allow at each pixel: the colours, and the number of polygons that cover it. Polygons
@@ -40,7 +40,7 @@ struct Expected {
 
 impl fmt::Debug for Expected {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("an expected picture")
+        f.write_str("an expected frame")
     }
 }
 
@@ -171,17 +171,17 @@ fn every_golden_is_what_the_oracle_draws() {
         stage.set(entry.scene(&entry.paint(&mut texels)));
         let pose = pose(&golden);
         // The committed PNG.
-        let picture = golden.picture().unwrap().expect("it was blessed");
+        let frame = golden.frame().unwrap().expect("it was blessed");
         let affine = expected(&mut stage, &pose, Mapper::default());
         let mapper = golden.look.mapper.unwrap_or_default();
         let background = stage.background();
         match mapper {
             // This loop's fractions are shorter.
             Mapper::Affine(Loop::Packed) => {
-                compare_coverage(&golden.name, &affine, background, |i| picture.pixels[i]);
+                compare_coverage(&golden.name, &affine, background, |i| frame.pixels[i]);
             }
-            Mapper::Affine(_) => compare(&golden.name, &affine, |i| picture.pixels[i]),
-            _ => compare_coverage(&golden.name, &affine, background, |i| picture.pixels[i]),
+            Mapper::Affine(_) => compare(&golden.name, &affine, |i| frame.pixels[i]),
+            _ => compare_coverage(&golden.name, &affine, background, |i| frame.pixels[i]),
         }
         between += affine
             .colours
