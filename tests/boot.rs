@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use frames::card::{self, Card, Emulated};
 use modex::registers::MODE_X;
-use protocol::{Action, Change, Command, Content, Fault, FrameName};
+use protocol::{Action, Change, Command, Content, FailKind, FrameName};
 use qemu::{Config, Limits, Machine, Verdict};
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -170,7 +170,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
         machine.key("pgup", true).unwrap();
         machine.key("pgup", false).unwrap();
     });
-    let steer = |name| Command::Steer(None, Change::Act(Action::parse(name).unwrap()));
+    let steer = |name: &str| Command::Steer(None, Change::Act(name.parse::<Action>().unwrap()));
     for name in ["next-scene", "pitch-up", "coarser"] {
         machine.ask(steer(name)).unwrap();
         machine.rest(Duration::from_millis(100)).unwrap();
@@ -224,13 +224,13 @@ fn a_steered_show_is_brought_back_by_its_log() {
 }
 
 /// Makes the kernel fail, and returns the verdict.
-fn failure(fault: Fault) -> Judged {
-    failure_within(Limits::default(), fault)
+fn failure(kind: FailKind) -> Judged {
+    failure_within(Limits::default(), kind)
 }
 
-fn failure_within(limits: Limits, fault: Fault) -> Judged {
+fn failure_within(limits: Limits, kind: FailKind) -> Judged {
     let mut machine = boot_with(&[], limits);
-    let judged = Judged(verdict(machine.ask(Command::Fail(fault))));
+    let judged = Judged(verdict(machine.ask(Command::Fail(kind))));
     let evidence = judged.0.evidence.as_deref().expect("evidence is kept");
     for name in ["command.txt", "serial.log", "screen.png"] {
         let there = evidence.join(name).exists();
@@ -241,7 +241,7 @@ fn failure_within(limits: Limits, fault: Fault) -> Judged {
 
 #[test]
 fn a_panic_is_told_with_its_place() {
-    let judged = failure(Fault::Panic);
+    let judged = failure(FailKind::Panic);
     let Verdict::Panic { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
@@ -255,7 +255,7 @@ fn a_panic_is_told_with_its_place() {
 /// The line is locked and half written; the report must pass both.
 #[test]
 fn a_panic_in_the_middle_of_a_line_is_told_whole() {
-    let judged = failure(Fault::PanicInLine);
+    let judged = failure(FailKind::PanicInLine);
     let Verdict::Panic { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
@@ -288,13 +288,13 @@ fn a_reboot_loop_is_noticed() {
     let mut config = config();
     config.arguments = vec!["-action".into(), "reboot=reset".into()];
     let mut machine = Machine::boot(&config).unwrap();
-    let judged = Judged(verdict(machine.ask(Command::Fail(Fault::TripleFault))));
+    let judged = Judged(verdict(machine.ask(Command::Fail(FailKind::TripleFault))));
     assert_eq!(judged.0.verdict, Verdict::TripleFault { booted: true });
 }
 
 #[test]
 fn an_exception_is_told_with_its_registers() {
-    let judged = failure(Fault::PageFault);
+    let judged = failure(FailKind::PageFault);
     let Verdict::Exception { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
@@ -311,7 +311,7 @@ fn an_exception_is_told_with_its_registers() {
 
 #[test]
 fn a_stack_overflow_has_its_name() {
-    let judged = failure(Fault::StackOverflow);
+    let judged = failure(FailKind::StackOverflow);
     let Verdict::Exception { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
@@ -323,13 +323,13 @@ fn a_stack_overflow_has_its_name() {
 
 #[test]
 fn a_triple_fault_is_no_success() {
-    let judged = failure(Fault::TripleFault);
+    let judged = failure(FailKind::TripleFault);
     assert_eq!(judged.0.verdict, Verdict::TripleFault { booted: false });
 }
 
 #[test]
 fn an_adapter_that_does_not_take_the_mode_is_named() {
-    let judged = failure(Fault::Adapter);
+    let judged = failure(FailKind::Adapter);
     let Verdict::Adapter { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
@@ -343,7 +343,7 @@ fn an_adapter_that_does_not_take_the_mode_is_named() {
 
 #[test]
 fn a_hang_is_noticed() {
-    let judged = failure_within(short(), Fault::Hang);
+    let judged = failure_within(short(), FailKind::Hang);
     let waited_for = "the answer to 'fail hang'".into();
     assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }

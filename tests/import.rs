@@ -545,7 +545,7 @@ fn bytes_of_dumps_and_descriptions_are_escaped() {
         (
             &["diff", "a.dump", "a.dump"][..],
             2,
-            "a line with the byte 1b",
+            "the line contains the byte 1b",
         ),
         (
             &["diff", evil, "a.dump"],

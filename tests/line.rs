@@ -141,7 +141,7 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
                 }
                 line
             },
-            "the line says checksum",
+            "the line has checksum",
         ),
         (
             "a dropped byte",
@@ -152,7 +152,7 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
                 }
                 line
             },
-            "the line says checksum",
+            "the line has checksum",
         ),
         (
             "a CR in a line",
@@ -168,7 +168,7 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
         (
             "a lost line end",
             |n, line| line[..line.len() - usize::from(n == 100)].to_vec(),
-            "a line of more than 700 bytes",
+            "the line is longer than 700 bytes",
         ),
         (
             "a lost line",
@@ -216,7 +216,7 @@ fn a_garbled_dump_ends_the_run() {
     let Verdict::Garbled { why } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
-    assert!(why.contains("the line says checksum"), "{why}");
+    assert!(why.contains("the line has checksum"), "{why}");
 }
 
 #[test]
@@ -335,14 +335,14 @@ fn noise_on_the_line_is_answered_and_survived() {
     machine.ask(Command::Hold).unwrap();
     for (noise, reason) in [
         (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
-        (vec![b'x'; 200_000], "more than 700 bytes"),
-        (b"show 4294967296\n".to_vec(), "a frame number"),
+        (vec![b'x'; 200_000], "longer than 700 bytes"),
+        (b"show 4294967296\n".to_vec(), "use 'show FRAME'"),
         (
             b"show pose 0 0 0 ffffffff\n".to_vec(),
             "a distance is 0 to 00800000",
         ),
-        (b"shew 1\n".to_vec(), "no command 'shew'"),
-        (b"show 1 *00000000\n".to_vec(), "says checksum 00000000"),
+        (b"shew 1\n".to_vec(), "unknown command 'shew'"),
+        (b"show 1 *00000000\n".to_vec(), "has checksum 00000000"),
     ] {
         machine.send_raw(&noise).unwrap();
         if !noise.ends_with(b"\n") {

@@ -15,7 +15,7 @@ use core::ptr::NonNull;
 use bootloader_api::config::Mapping;
 use bootloader_api::{BootInfo, BootloaderConfig};
 use modex::SetError;
-use protocol::{Exit, HELLO, PROTOCOL};
+use protocol::{Exit, FailKind, HELLO, PROTOCOL};
 
 pub use vga::Window;
 
@@ -101,21 +101,21 @@ pub fn stop() -> ! {
 }
 
 /// Fails in the requested way.
-pub fn fail(fault: protocol::Fault) -> ! {
-    match fault {
-        protocol::Fault::Panic => panic!("asked to, by 'fail panic'"),
-        protocol::Fault::PanicInLine => panic_in_line(),
-        protocol::Fault::PageFault => cpu::page_fault(),
-        protocol::Fault::StackOverflow => cpu::stack_overflow(),
-        protocol::Fault::TripleFault => cpu::triple_fault(),
+pub fn fail(kind: FailKind) -> ! {
+    match kind {
+        FailKind::Panic => panic!("asked to, by 'fail panic'"),
+        FailKind::PanicInLine => panic_in_line(),
+        FailKind::PageFault => cpu::page_fault(),
+        FailKind::StackOverflow => cpu::stack_overflow(),
+        FailKind::TripleFault => cpu::triple_fault(),
         // The error that setting the mode returns if RAM is in place of the window.
-        protocol::Fault::Adapter => report::adapter(SetError::Plane {
+        FailKind::Adapter => report::adapter(SetError::Plane {
             plane: 0,
             at: 0,
             expected: 0x51,
             actual: 0x54,
         }),
-        protocol::Fault::Hang => stop(),
+        FailKind::Hang => stop(),
     }
 }
 

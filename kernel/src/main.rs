@@ -38,7 +38,7 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
             }
             show.set_reception(serial::reception());
             match show.receive(received.byte, timer::ticks(), out) {
-                Some(Request::Fail(fault)) => machine::fail(fault),
+                Some(Request::Fail(kind)) => machine::fail(kind),
                 Some(Request::Leave) => machine::exit(protocol::Exit::Left),
                 None => {}
             }

@@ -8,7 +8,9 @@ use std::fmt;
 use std::io::{self, Write};
 
 use modex::Palette;
-use protocol::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
+use protocol::dump::{
+    COLOURS_A_LINE, DumpChecksum, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION,
+};
 use protocol::{Content, FrameName, Lines, Motion, Word};
 
 use crate::indexed::Indexed;
@@ -93,7 +95,7 @@ impl Dump {
         let mut reader = Reader {
             lines: lines.iter().map(AsRef::as_ref).collect(),
             read: 0,
-            whole: Whole::default(),
+            whole: DumpChecksum::default(),
         };
         reader.dump().map_err(|why| NoDump {
             line: reader.read.max(1),
@@ -196,7 +198,7 @@ fn no_dump(why: &str) -> String {
 struct Reader<'a> {
     lines: Vec<&'a str>,
     read: usize,
-    whole: Whole,
+    whole: DumpChecksum,
 }
 
 impl<'a> Reader<'a> {
@@ -416,7 +418,7 @@ mod tests {
     /// Returns the lines with a new last line that matches the lines before it.
     fn ended(mut lines: Vec<String>) -> Vec<String> {
         lines.pop();
-        let mut whole = Whole::default();
+        let mut whole = DumpChecksum::default();
         for line in &lines {
             whole.add(format_args!("{line}"));
         }

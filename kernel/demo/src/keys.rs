@@ -224,10 +224,10 @@ mod tests {
 
     #[test]
     fn every_action_has_a_key_and_no_key_two() {
-        for (name, action) in Action::ALL {
+        for &action in Action::ALL {
             let with = KEYS.iter().filter(|key| key.action == action);
             let one = usize::from(action != Action::Hint);
-            assert_eq!(with.count(), one, "{name}");
+            assert_eq!(with.count(), one, "{action}");
         }
         let mut codes: Vec<_> = KEYS.iter().flat_map(|key| key.codes).collect();
         let all = codes.len();

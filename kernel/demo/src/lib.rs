@@ -25,7 +25,7 @@ use model::{Arena, ModelFile};
 use modex::{Bus, Counted, Destination, HEIGHT, ModeX, Offscreen, SetError, Tally, WIDTH};
 use protocol::dump::{self, Header, OrNone};
 use protocol::{
-    Action, Change, Command, Content, ERROR, Fault, FrameName, Lines, Motion, OK, PROTOCOL,
+    Action, Change, Command, Content, ERROR, FailKind, FrameName, Lines, Motion, OK, PROTOCOL,
     RUNNING, Reception, Setting, Word,
 };
 use scene::catalogue::{Entry, MAX_TEXELS};
@@ -86,7 +86,7 @@ impl Default for Memory {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Request {
     /// Fail in this way.
-    Fail(Fault),
+    Fail(FailKind),
     /// End the program, as `leave` asks.
     Leave,
 }
@@ -318,7 +318,7 @@ impl<'a, B: Bus> Show<'a, B> {
                 "crystal-ball {VERSION} protocol {PROTOCOL} dump {}",
                 dump::VERSION
             )),
-            Command::Fail(fault) => return Some(Request::Fail(fault)),
+            Command::Fail(kind) => return Some(Request::Fail(kind)),
             Command::Leave => {}
         }
         out(format_args!("{OK} {command}"));

@@ -69,7 +69,7 @@ fn held(random: &mut Rng, tick: &mut u32) -> String {
             0 => format!("show at {}", random.u32(..*tick + 10)),
             _ => {
                 *tick += random.u32(..3);
-                let (_, action) = choice(random, &Action::ALL);
+                let action = choice(random, Action::ALL);
                 format!("steer {tick} {action}")
             }
         },
@@ -83,7 +83,7 @@ fn any(random: &mut Rng, tick: &mut u32) -> String {
         1 => "hold".into(),
         2 => setting(random),
         3..7 => {
-            let (_, action) = choice(random, &Action::ALL);
+            let action = choice(random, Action::ALL);
             format!("steer {action}")
         }
         7 => "steer quality".into(),
@@ -154,9 +154,9 @@ fn a_header_is_enough_to_draw_the_dump_again() {
         // Frames under an overlay have no name, so they are not compared.
         overlaid = running
             && (overlaid
-                || Action::ALL.iter().any(|(name, action)| {
-                    action.is_overlay() && command == format!("steer {name}")
-                }));
+                || Action::ALL
+                    .iter()
+                    .any(|action| action.is_overlay() && command == format!("steer {action}")));
         if !overlaid {
             let dumped = dump(&mut show, "dump");
             draw_again(&mut twin, &dumped);

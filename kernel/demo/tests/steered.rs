@@ -46,7 +46,7 @@ fn a_log_brings_back_every_frame_byte_for_byte() {
         }
         // Some changes come after the frame of their tick, and some before it.
         for _ in 0..random.usize(..4) {
-            let (_, action) = Action::ALL[random.usize(..Action::ALL.len())];
+            let action = Action::ALL[random.usize(..Action::ALL.len())];
             match random.u8(..8) {
                 // A reset removes earlier changes from the log.
                 _ if action == Action::Reset || action.is_overlay() => {}

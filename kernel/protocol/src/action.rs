@@ -2,10 +2,13 @@
 
 use core::fmt;
 
+use strum::{Display, EnumString, VariantArray};
+
 use crate::{Setting, Word};
 
 /// An action. Each key that does something has one action.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display, EnumString, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub enum Action {
     /// `yaw-left`: turn about the solid's own axis; the side towards the viewer moves to the left.
@@ -61,61 +64,18 @@ pub enum Action {
 }
 
 impl Action {
-    /// All actions, with their names in the protocol.
-    pub const ALL: [(&'static str, Self); 25] = [
-        ("yaw-left", Self::YawLeft),
-        ("yaw-right", Self::YawRight),
-        ("pitch-up", Self::PitchUp),
-        ("pitch-down", Self::PitchDown),
-        ("roll-left", Self::RollLeft),
-        ("roll-right", Self::RollRight),
-        ("faster", Self::Faster),
-        ("slower", Self::Slower),
-        ("stop", Self::Stop),
-        ("pause", Self::Pause),
-        ("step", Self::Step),
-        ("nearer", Self::Nearer),
-        ("farther", Self::Farther),
-        ("next-scene", Self::NextScene),
-        ("next-mapper", Self::NextMapper),
-        ("last-mapper", Self::LastMapper),
-        ("finer", Self::Finer),
-        ("coarser", Self::Coarser),
-        ("next-order", Self::NextOrder),
-        ("quality", Self::Quality),
-        ("help", Self::Help),
-        ("info", Self::Info),
-        ("split", Self::Split),
-        ("hint", Self::Hint),
-        ("reset", Self::Reset),
-    ];
+    /// All actions.
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// Returns whether an action changes only the overlay of a running demo. A log contains no such action,
     /// and a held demo refuses it.
     pub const fn is_overlay(self) -> bool {
         matches!(self, Self::Help | Self::Info | Self::Split | Self::Hint)
     }
-
-    /// Returns the action with a name.
-    pub fn parse(name: &str) -> Option<Self> {
-        let named = Self::ALL.iter().find(|(known, _)| *known == name);
-        named.map(|&(_, action)| action)
-    }
-}
-
-impl fmt::Display for Action {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::ALL.iter().find(|(_, action)| action == self);
-        f.write_str(named.map_or("", |(name, _)| name))
-    }
 }
 
 /// A change to a running demo's frames, from a tick on.
-///
-/// `repr(u8)` keeps the tag in a byte before the payload, so a change to [`Action::YawLeft`] is all zeros. An
-/// empty log then occupies no space in the kernel's image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
 pub enum Change {
     /// `ACTION`
     Act(Action),
@@ -127,9 +87,9 @@ impl Change {
     /// Parses a change, as [`fmt::Display`] writes it.
     pub fn parse<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
         let first = words.next()?;
-        let change = match Setting::parse(first) {
-            Some(setting) => Self::Set(setting, Word::new(words.next()?)?),
-            None => Self::Act(Action::parse(first)?),
+        let change = match first.parse() {
+            Ok(setting) => Self::Set(setting, Word::new(words.next()?)?),
+            Err(_) => Self::Act(first.parse().ok()?),
         };
         words.next().is_none().then_some(change)
     }
@@ -146,12 +106,15 @@ impl fmt::Display for Change {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
     use super::*;
+    use std::string::ToString;
 
     #[test]
-    fn four_actions_change_only_how_a_show_is_looked_at() {
-        for (name, action) in Action::ALL {
-            let overlay = ["help", "info", "split", "hint"].contains(&name);
+    fn four_actions_change_only_the_overlay() {
+        for action in Action::ALL {
+            let name = action.to_string();
+            let overlay = ["help", "info", "split", "hint"].contains(&name.as_str());
             assert_eq!(action.is_overlay(), overlay, "{name}");
         }
     }

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use strum::{Display, EnumString, VariantArray};
+
 use crate::{Change, ChecksumError, without_checksum};
 
 /// A command, as a line contains it.
@@ -44,7 +46,7 @@ pub enum Command {
     /// `version`: print the versions of the program, the protocol and the dumps.
     Version,
     /// `fail KIND`: fail in the named way, to prove that the host notices.
-    Fail(Fault),
+    Fail(FailKind),
     /// `leave`: end QEMU with the code for success.
     Leave,
 }
@@ -153,7 +155,8 @@ impl fmt::Display for FrameName {
 }
 
 /// A setting that commands change by name.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display, EnumString)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Setting {
     /// `scene`: the scene to draw. The card's mode is set again; in a running demo, only if the scene
     /// changes.
@@ -162,28 +165,6 @@ pub enum Setting {
     Mapper,
     /// `order`: the order in which a frame's spans are drawn, and the memory that they are drawn in.
     Order,
-}
-
-impl Setting {
-    /// All settings, with their words.
-    pub const ALL: [(&'static str, Self); 3] = [
-        ("scene", Self::Scene),
-        ("mapper", Self::Mapper),
-        ("order", Self::Order),
-    ];
-
-    /// Returns the setting with a word.
-    pub fn parse(word: &str) -> Option<Self> {
-        let known = Self::ALL.iter().find(|(known, _)| *known == word);
-        known.map(|&(_, setting)| setting)
-    }
-}
-
-impl fmt::Display for Setting {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let word = Self::ALL.iter().find(|(_, setting)| setting == self);
-        f.write_str(word.map_or("", |(word, _)| word))
-    }
 }
 
 /// A name that only the program can interpret.
@@ -249,8 +230,9 @@ pub enum Content {
 }
 
 /// A way to fail on purpose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Display, EnumString, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
+pub enum FailKind {
     /// `panic`
     Panic,
     /// `panic-in-line`: panic in the middle of a line of an answer, with the serial line locked.
@@ -267,31 +249,60 @@ pub enum Fault {
     Hang,
 }
 
-impl Fault {
-    /// All faults, with their names in the protocol.
-    pub const ALL: [(&'static str, Self); 7] = [
-        ("panic", Self::Panic),
-        ("panic-in-line", Self::PanicInLine),
-        ("page-fault", Self::PageFault),
-        ("stack-overflow", Self::StackOverflow),
-        ("triple-fault", Self::TripleFault),
-        ("adapter", Self::Adapter),
-        ("hang", Self::Hang),
-    ];
+impl FailKind {
+    /// All kinds.
+    pub const ALL: &'static [Self] = Self::VARIANTS;
+}
+
+/// Each command's first word, and how the command is written.
+///
+/// Kept by hand, because the second column is prose. A test checks that each command is here.
+const USAGE: &[(&str, &str)] = &[
+    ("hold", "'hold'"),
+    ("run", "'run'"),
+    (
+        "show",
+        "'show FRAME', 'show FRAME motion MOTION' or 'show at TICK'; FRAME is a number, 0 to 4294967295, \
+         or 'pose' and four hex numbers: yaw, pitch, roll, distance; MOTION is four hex numbers: the \
+         change of each in a tick; TICK is 0 to 4294967295",
+    ),
+    ("scene", "'scene' to list the scenes, or 'scene NAME'"),
+    ("mapper", "'mapper' to list the mappers, or 'mapper NAME'"),
+    ("order", "'order' to list the orders, or 'order NAME'"),
+    (
+        "steer",
+        "'steer CHANGE' while the demo is running, or 'steer TICK CHANGE' while it is held; CHANGE is an \
+         action ('keys' lists them), or scene, mapper or order and a name; TICK is 0 to 4294967295",
+    ),
+    ("log", "'log'"),
+    ("keys", "'keys'"),
+    ("dump", "'dump' or 'dump all'"),
+    ("checksums", "'checksums' or 'checksums all'"),
+    ("registers", "'registers'"),
+    ("counts", "'counts'"),
+    ("state", "'state'"),
+    ("version", "'version'"),
+    (
+        "fail",
+        "'fail KIND'; KIND is panic, panic-in-line, page-fault, stack-overflow, triple-fault, adapter or \
+         hang",
+    ),
+    ("leave", "'leave'"),
+];
+
+/// Returns how a command is written, or `None` if no command begins with `word`.
+fn usage(word: &str) -> Option<&'static str> {
+    let command = USAGE.iter().find(|(known, _)| *known == word);
+    command.map(|&(_, usage)| usage)
 }
 
 /// Why a line is not a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandError<'a> {
-    /// The first word is not a command.
+    /// No command begins with this word.
     Unknown(&'a str),
-    /// The words after the command are not legal for it.
-    Arguments {
-        /// The command.
-        command: &'a str,
-        /// The arguments that the command accepts.
-        takes: &'static str,
-    },
+    /// The words after this command are not legal for it.
+    Arguments(&'a str),
     /// The line has a checksum, which is wrong.
     Checksum(ChecksumError),
 }
@@ -299,17 +310,23 @@ pub enum CommandError<'a> {
 impl fmt::Display for CommandError<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Unknown(word) => write!(
-                f,
-                "no command '{word}'; there are hold, run, show FRAME, show FRAME motion MOTION, show at TICK, scene NAME, \
-                 mapper NAME, order NAME, steer CHANGE, steer TICK CHANGE, log, keys, dump, checksums, \
-                 registers, counts, state, version, fail KIND, leave"
-            ),
-            Self::Arguments { command, takes } => write!(f, "'{command}' takes {takes}"),
+            Self::Unknown(word) => {
+                write!(f, "unknown command '{word}'; the commands are")?;
+                for (i, (command, _)) in USAGE.iter().enumerate() {
+                    write!(f, "{} {command}", if i == 0 { "" } else { "," })?;
+                }
+                Ok(())
+            }
+            Self::Arguments(command) => {
+                let usage = usage(command).unwrap_or("");
+                write!(f, "the arguments of '{command}' are wrong; use {usage}")
+            }
             Self::Checksum(error) => error.fmt(f),
         }
     }
 }
+
+impl core::error::Error for CommandError<'_> {}
 
 impl Command {
     /// Parses a command, and checks its checksum if it has one.
@@ -324,80 +341,63 @@ impl Command {
         };
         let mut words = text.split_ascii_whitespace();
         let command = words.next().unwrap_or("");
-        let takes = |takes| CommandError::Arguments { command, takes };
-        if command == "show" {
-            let at = words.clone().next() == Some("at");
-            let shown = match at {
-                true => {
-                    words.next();
-                    let tick = words.next().and_then(decimal);
-                    tick.filter(|_| words.next().is_none()).map(Self::ShowAt)
-                }
-                false => {
-                    let mut motion = words.clone().skip_while(|word| *word != "motion");
-                    let frame = FrameName::parse(words.take_while(|word| *word != "motion"));
-                    frame.and_then(|frame| match motion.next() {
-                        Some(_) => Some(Self::ShowMoving(frame, Motion::parse(motion)?)),
-                        None => Some(Self::Show(frame)),
-                    })
-                }
-            };
-            return shown.ok_or(takes(
-                "a frame number, 0 to 4294967295, or 'pose' and four hex numbers: \
-                 yaw, pitch, roll, distance, either of them alone or followed by 'motion' and four \
-                 hex numbers: what each changes by in a tick; or 'at' and a tick",
-            ));
-        }
-        if command == "steer" {
-            let tick = words.clone().next().and_then(decimal);
-            if tick.is_some() {
-                words.next();
-            }
-            let change = Change::parse(words).map(|change| Self::Steer(tick, change));
-            return change.ok_or(takes(
-                "an action ('keys' lists them), or scene, mapper or order and a name; \
-                 for a held show a tick before it, 0 to 4294967295",
-            ));
-        }
-        let argument = words.next();
-        if words.next().is_some() {
-            return Err(takes("at most one word"));
-        }
-        let content = || match argument {
-            None => Ok(Content::Page),
-            Some("all") => Ok(Content::Memory),
-            Some(_) => Err(takes("nothing, or 'all'")),
+        usage(command).ok_or(CommandError::Unknown(command))?;
+        let parsed = match command {
+            "show" => Self::parse_show(words),
+            "steer" => Self::parse_steer(words),
+            _ => Self::parse_short(command, words.next()).filter(|_| words.next().is_none()),
         };
-        if let Some(setting) = Setting::parse(command) {
-            let word = argument.map(|argument| {
-                Word::new(argument).ok_or(takes("nothing, or a name; alone it lists them"))
+        parsed.ok_or(CommandError::Arguments(command))
+    }
+
+    /// Parses the words after `show`.
+    fn parse_show<'a>(mut words: impl Iterator<Item = &'a str> + Clone) -> Option<Self> {
+        if words.clone().next() == Some("at") {
+            let tick = words.nth(1).and_then(decimal)?;
+            return words.next().is_none().then_some(Self::ShowAt(tick));
+        }
+        let mut motion = words.clone().skip_while(|word| *word != "motion");
+        let frame = FrameName::parse(words.take_while(|word| *word != "motion"))?;
+        Some(match motion.next() {
+            Some(_) => Self::ShowMoving(frame, Motion::parse(motion)?),
+            None => Self::Show(frame),
+        })
+    }
+
+    /// Parses the words after `steer`.
+    fn parse_steer<'a>(mut words: impl Iterator<Item = &'a str> + Clone) -> Option<Self> {
+        let tick = words.clone().next().and_then(decimal);
+        if tick.is_some() {
+            words.next();
+        }
+        Some(Self::Steer(tick, Change::parse(words)?))
+    }
+
+    /// Parses a command that has at most one argument.
+    fn parse_short(command: &str, argument: Option<&str>) -> Option<Self> {
+        if let Ok(setting) = command.parse() {
+            return Some(match argument {
+                Some(name) => Self::Set(setting, Some(Word::new(name)?)),
+                None => Self::Set(setting, None),
             });
-            return Ok(Self::Set(setting, word.transpose()?));
         }
-        let plain = match command {
-            "dump" => return content().map(Self::Dump),
-            "checksums" => return content().map(Self::Checksums),
-            "fail" => {
-                let fault = Fault::ALL.iter().find(|(name, _)| argument == Some(name));
-                return fault.map(|&(_, fault)| Self::Fail(fault)).ok_or(takes(
-                    "panic, panic-in-line, page-fault, stack-overflow, triple-fault, adapter or hang",
-                ));
-            }
-            "hold" => Self::Hold,
-            "run" => Self::Run,
-            "log" => Self::Log,
-            "keys" => Self::Keys,
-            "registers" => Self::Registers,
-            "counts" => Self::Counts,
-            "state" => Self::State,
-            "version" => Self::Version,
-            "leave" => Self::Leave,
-            _ => return Err(CommandError::Unknown(command)),
-        };
-        match argument {
-            None => Ok(plain),
-            Some(_) => Err(takes("nothing")),
-        }
+        Some(match (command, argument) {
+            ("hold", None) => Self::Hold,
+            ("run", None) => Self::Run,
+            ("log", None) => Self::Log,
+            ("keys", None) => Self::Keys,
+            ("dump", None) => Self::Dump(Content::Page),
+            ("dump", Some("all")) => Self::Dump(Content::Memory),
+            ("checksums", None) => Self::Checksums(Content::Page),
+            ("checksums", Some("all")) => Self::Checksums(Content::Memory),
+            ("registers", None) => Self::Registers,
+            ("counts", None) => Self::Counts,
+            ("state", None) => Self::State,
+            ("version", None) => Self::Version,
+            ("fail", Some(kind)) => Self::Fail(kind.parse().ok()?),
+            ("leave", None) => Self::Leave,
+            _ => return None,
+        })
     }
 }
 
@@ -423,10 +423,7 @@ impl fmt::Display for Command {
             Self::Counts => f.write_str("counts"),
             Self::State => f.write_str("state"),
             Self::Version => f.write_str("version"),
-            Self::Fail(fault) => {
-                let name = Fault::ALL.iter().find(|(_, f)| f == fault);
-                write!(f, "fail {}", name.map_or("", |(name, _)| name))
-            }
+            Self::Fail(kind) => write!(f, "fail {kind}"),
             Self::Leave => f.write_str("leave"),
         }
     }
@@ -448,7 +445,7 @@ mod tests {
     };
 
     #[test]
-    fn every_command_comes_back() {
+    fn every_command_is_parsed_from_its_text_and_has_a_usage() {
         let mut commands = std::vec![
             Command::Hold,
             Command::Run,
@@ -488,74 +485,94 @@ mod tests {
             Command::Leave,
         ];
         let mapper = Change::Set(Setting::Mapper, Word::new("within-1/256").unwrap());
-        let actions = Action::ALL.map(|(_, action)| Change::Act(action));
-        for change in actions.into_iter().chain([mapper]) {
+        let actions = Action::ALL.iter().copied().map(Change::Act);
+        for change in actions.chain([mapper]) {
             commands.extend([None, Some(0), Some(u32::MAX)].map(|t| Command::Steer(t, change)));
         }
-        commands.extend(Fault::ALL.map(|(_, fault)| Command::Fail(fault)));
+        commands.extend(FailKind::ALL.iter().copied().map(Command::Fail));
         for command in commands {
             let mut framed = Vec::new();
             crate::write_line(format_args!("{command}"), |b| framed.extend_from_slice(b));
             let framed = std::str::from_utf8(&framed).unwrap().trim_end();
-            assert_eq!(Command::parse(&command.to_string()), Ok(command));
+            let text = command.to_string();
+            assert_eq!(Command::parse(&text), Ok(command));
+            assert!(usage(text.split(' ').next().unwrap()).is_some(), "{text}");
             assert_eq!(Command::parse(framed), Ok(command));
         }
+        for kind in FailKind::ALL {
+            assert!(usage("fail").unwrap().contains(&kind.to_string()), "{kind}");
+        }
     }
 
     #[test]
-    fn a_word_is_what_is_displayed_if_it_is_one() {
+    fn a_word_has_the_displayed_text_if_that_is_legal() {
         assert_eq!(Word::of("within-1/2"), Word::new("within-1/2"));
         assert_eq!(Word::of(format_args!("{}-{}", 1, 2)), Word::new("1-2"));
-        for no_word in ["", "two words", "a-name-of-25-characters-is", "\u{e9}"] {
-            assert_eq!((Word::of(no_word), Word::new(no_word)), (None, None));
+        for illegal in ["", "two words", "a-name-of-25-characters-is", "\u{e9}"] {
+            assert_eq!((Word::of(illegal), Word::new(illegal)), (None, None));
         }
     }
 
     #[test]
-    fn what_is_no_command_is_named() {
-        for (line, reason) in [
-            ("", "no command ''"),
-            ("shew 1", "no command 'shew'"),
-            ("show", "a frame number"),
-            ("show -1", "a frame number"),
-            ("show +1", "a frame number"),
-            ("show 4294967296", "a frame number"),
-            ("show 1 2", "a frame number"),
-            ("show pose 1 2 3", "four hex numbers"),
-            ("show pose 1 2 3 4 5", "four hex numbers"),
-            ("show pose +1 2 3 4", "four hex numbers"),
-            ("show pose 1 2 3 123456789", "four hex numbers"),
-            ("show motion 1 2 3 4", "a frame number"),
-            ("show 1 motion", "'motion' and four hex numbers"),
-            ("show 1 motion 1 2 3", "'motion' and four hex numbers"),
-            ("show 1 motion 1 2 3 4 5", "'motion' and four hex numbers"),
-            ("show 1 motion 1 2 3 -4", "'motion' and four hex numbers"),
-            (
-                "show 1 motion 1 2 3 123456789",
-                "'motion' and four hex numbers",
-            ),
-            ("show at 1 motion 1 2 3 4", "'at' and a tick"),
-            ("show at", "'at' and a tick"),
-            ("show at -1", "'at' and a tick"),
-            ("show at 1 2", "'at' and a tick"),
-            ("steer", "an action ('keys' lists them)"),
-            ("steer 5", "an action"),
-            ("steer yaw", "an action"),
-            ("steer stop 5", "an action"),
-            ("steer 4294967296 stop", "an action"),
-            ("steer 5 mapper", "an action"),
-            ("log it", "'log' takes nothing"),
-            ("mapper affine exact", "at most one word"),
-            ("mapper a-name-that-is-much-too-long", "nothing, or a name"),
-            ("dump it", "nothing, or 'all'"),
-            ("checksums all all", "at most one word"),
-            ("hold on", "'hold' takes nothing"),
-            ("fail", "panic, panic-in-line"),
-            ("fail me", "panic, panic-in-line"),
-            ("hold *00000000", "says checksum 00000000"),
-        ] {
-            let error = Command::parse(line).unwrap_err().to_string();
-            assert!(error.contains(reason), "{line:?}: {error}");
+    fn an_error_names_the_wrong_word_or_the_usage() {
+        for line in ["", "shew 1"] {
+            let error = Command::parse(line).unwrap_err();
+            assert!(matches!(error, CommandError::Unknown(word) if line.starts_with(word)));
+            let text = error.to_string();
+            assert!(
+                text.ends_with(
+                    "the commands are hold, run, show, scene, mapper, order, steer, log, \
+                keys, dump, checksums, registers, counts, state, version, fail, leave"
+                ),
+                "{text}"
+            );
         }
+        for (line, usage) in [
+            ("show", "'show FRAME', "),
+            ("show -1", "'show FRAME', "),
+            ("show +1", "'show FRAME', "),
+            ("show 4294967296", "'show FRAME', "),
+            ("show 1 2", "'show FRAME', "),
+            ("show pose 1 2 3", "'show FRAME', "),
+            ("show pose 1 2 3 4 5", "'show FRAME', "),
+            ("show pose +1 2 3 4", "'show FRAME', "),
+            ("show pose 1 2 3 123456789", "'show FRAME', "),
+            ("show motion 1 2 3 4", "'show FRAME', "),
+            ("show 1 motion", "'show FRAME', "),
+            ("show 1 motion 1 2 3", "'show FRAME', "),
+            ("show 1 motion 1 2 3 4 5", "'show FRAME', "),
+            ("show 1 motion 1 2 3 -4", "'show FRAME', "),
+            ("show 1 motion 1 2 3 123456789", "'show FRAME', "),
+            ("show at 1 motion 1 2 3 4", "'show FRAME', "),
+            ("show at", "'show FRAME', "),
+            ("show at -1", "'show FRAME', "),
+            ("show at 1 2", "'show FRAME', "),
+            ("steer", "'steer CHANGE' "),
+            ("steer 5", "'steer CHANGE' "),
+            ("steer yaw", "'steer CHANGE' "),
+            ("steer stop 5", "'steer CHANGE' "),
+            ("steer 4294967296 stop", "'steer CHANGE' "),
+            ("steer 5 mapper", "'steer CHANGE' "),
+            ("log it", "'log'"),
+            ("mapper affine exact", "'mapper' to list the mappers, "),
+            (
+                "mapper a-name-that-is-much-too-long",
+                "'mapper' to list the mappers, ",
+            ),
+            ("dump it", "'dump' or 'dump all'"),
+            ("checksums all all", "'checksums' or 'checksums all'"),
+            ("hold on", "'hold'"),
+            ("fail", "'fail KIND'; KIND is panic, "),
+            ("fail me", "'fail KIND'; KIND is panic, "),
+        ] {
+            let command = line.split(' ').next().unwrap();
+            let error = Command::parse(line).unwrap_err();
+            assert_eq!(error, CommandError::Arguments(command), "{line:?}");
+            let text = error.to_string();
+            let start = std::format!("the arguments of '{command}' are wrong; use {usage}");
+            assert!(text.starts_with(&start), "{line:?}: {text}");
+        }
+        let error = Command::parse("hold *00000000").unwrap_err();
+        assert!(matches!(error, CommandError::Checksum(_)), "{error}");
     }
 }

@@ -132,12 +132,12 @@ impl<S> Header<S> {
 
 /// The CRC-32 over a dump's lines. It displays as the dump's last line.
 #[derive(Clone, Debug, Default)]
-pub struct Whole {
+pub struct DumpChecksum {
     checksum: Checksum,
     lines: usize,
 }
 
-impl Whole {
+impl DumpChecksum {
     /// Adds a line's text.
     pub fn add(&mut self, line: fmt::Arguments<'_>) {
         struct Into<'a>(&'a mut Checksum);
@@ -155,7 +155,7 @@ impl Whole {
 }
 
 /// The dump's last line.
-impl fmt::Display for Whole {
+impl fmt::Display for DumpChecksum {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "end {} lines {:08x}", self.lines, self.checksum.value())
     }
@@ -172,9 +172,9 @@ pub fn write<S: fmt::Display>(
     mut load: impl FnMut(u16, &mut [u8]),
     mut line: impl FnMut(fmt::Arguments<'_>),
 ) {
-    let mut whole = Whole::default();
-    let mut put = |text: fmt::Arguments<'_>| {
-        whole.add(text);
+    let mut checksum = DumpChecksum::default();
+    let mut write_line = |text: fmt::Arguments<'_>| {
+        checksum.add(text);
         line(text);
     };
     let Header {
@@ -188,29 +188,29 @@ pub fn write<S: fmt::Display>(
         width,
         height,
     } = header;
-    put(format_args!("{MAGIC} {VERSION}"));
-    put(format_args!("content {content}"));
-    put(format_args!("scene {scene}"));
+    write_line(format_args!("{MAGIC} {VERSION}"));
+    write_line(format_args!("content {content}"));
+    write_line(format_args!("scene {scene}"));
     match model_file {
-        Some(model_file) => put(format_args!("model {model_file:08x}")),
-        None => put(format_args!("model none")),
+        Some(model_file) => write_line(format_args!("model {model_file:08x}")),
+        None => write_line(format_args!("model none")),
     }
-    put(format_args!("mapper {}", OrNone(mapper)));
-    put(format_args!("frame {}", OrNone(frame)));
-    put(format_args!("motion {}", OrNone(motion)));
-    put(format_args!("start {start:04x}"));
-    put(format_args!("size {width} {height}"));
+    write_line(format_args!("mapper {}", OrNone(mapper)));
+    write_line(format_args!("frame {}", OrNone(frame)));
+    write_line(format_args!("motion {}", OrNone(motion)));
+    write_line(format_args!("start {start:04x}"));
+    write_line(format_args!("size {width} {height}"));
     for (i, colours) in palette.chunks(COLOURS_A_LINE).enumerate() {
         let first = i * COLOURS_A_LINE;
-        put(format_args!("palette {first:02x}{}", Colours(colours)));
+        write_line(format_args!("palette {first:02x}{}", Colours(colours)));
     }
     let mut pixels = [0; MAX_WIDTH];
     for row in header.rows() {
         let pixels = &mut pixels[..row.pixels];
         load(row.at, pixels);
-        put(format_args!("{row} {}", Hex(pixels)));
+        write_line(format_args!("{row} {}", Hex(pixels)));
     }
-    line(format_args!("{whole}"));
+    line(format_args!("{checksum}"));
 }
 
 /// Displays a value, or `none` if the value is missing.
@@ -373,7 +373,7 @@ mod tests {
                 assert_eq!(
                     crate::without_checksum(sent.trim_end()),
                     Ok(line.as_str()),
-                    "it was cut"
+                    "the line was cut"
                 );
             }
         }
@@ -396,7 +396,7 @@ mod tests {
     }
 
     #[test]
-    fn checksums_are_those_of_the_bytes() {
+    fn checksums_cover_the_bytes() {
         let mut lines = Vec::new();
         let mut addresses = 0;
         write_checksums(

@@ -48,7 +48,7 @@ impl fmt::Debug for Checksum {
 const CHUNK: usize = 64;
 
 /// Writer for the text of a line: makes it printable, cuts it to length, and computes its checksum.
-struct Summed<F> {
+struct LineWriter<F> {
     send: F,
     checksum: Checksum,
     room: usize,
@@ -56,7 +56,7 @@ struct Summed<F> {
     collected: usize,
 }
 
-impl<F: FnMut(&[u8])> Summed<F> {
+impl<F: FnMut(&[u8])> LineWriter<F> {
     fn flush(&mut self) {
         let chunk = &self.chunk[..core::mem::take(&mut self.collected)];
         self.checksum.add(chunk);
@@ -64,7 +64,7 @@ impl<F: FnMut(&[u8])> Summed<F> {
     }
 }
 
-impl<F: FnMut(&[u8])> Write for Summed<F> {
+impl<F: FnMut(&[u8])> Write for LineWriter<F> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         for c in text.chars() {
             if self.room == 0 {
@@ -88,7 +88,7 @@ impl<F: FnMut(&[u8])> Write for Summed<F> {
 /// becomes `?`, and text that would make the line longer than [`MAX_LINE`] is cut off, so every line written
 /// is legal.
 pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
-    let mut summed = Summed {
+    let mut writer = LineWriter {
         send,
         checksum: Checksum::new(),
         room: MAX_LINE - CHECKSUM,
@@ -96,15 +96,15 @@ pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
         collected: 0,
     };
     // The writer never fails. A `Display` implementation may, and the line then ends where it failed.
-    let _ = summed.write_fmt(text);
-    summed.flush();
-    let sum = summed.checksum.value();
+    let _ = writer.write_fmt(text);
+    writer.flush();
+    let sum = writer.checksum.value();
     // The checksum itself must always fit, and is not added to the checksum.
-    summed.room = CHECKSUM + 1;
-    let _ = write!(summed, " *{sum:08x}");
-    summed.chunk[summed.collected] = b'\n';
-    summed.collected += 1;
-    summed.flush();
+    writer.room = CHECKSUM + 1;
+    let _ = write!(writer, " *{sum:08x}");
+    writer.chunk[writer.collected] = b'\n';
+    writer.collected += 1;
+    writer.flush();
 }
 
 /// Why a line's checksum was not accepted.
@@ -115,7 +115,7 @@ pub enum ChecksumError {
     /// The checksum does not match the text.
     WrongChecksum {
         /// The checksum in the line.
-        said: u32,
+        stated: u32,
         /// The checksum of the line's text.
         computed: u32,
     },
@@ -125,9 +125,9 @@ impl fmt::Display for ChecksumError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NoChecksum => f.write_str("the line does not end in a checksum"),
-            Self::WrongChecksum { said, computed } => write!(
+            Self::WrongChecksum { stated, computed } => write!(
                 f,
-                "the line says checksum {said:08x}, its text has {computed:08x}"
+                "the line has checksum {stated:08x}, but its text has {computed:08x}"
             ),
         }
     }
@@ -145,12 +145,12 @@ pub fn without_checksum(line: &str) -> Result<&str, ChecksumError> {
     if digits.len() != 8 || !digits.bytes().all(lower_hex) {
         return Err(ChecksumError::NoChecksum);
     }
-    let said = u32::from_str_radix(digits, 16).map_err(|_| ChecksumError::NoChecksum)?;
+    let stated = u32::from_str_radix(digits, 16).map_err(|_| ChecksumError::NoChecksum)?;
     let computed = CRC.checksum(text.as_bytes());
-    if said == computed {
+    if stated == computed {
         Ok(text)
     } else {
-        Err(ChecksumError::WrongChecksum { said, computed })
+        Err(ChecksumError::WrongChecksum { stated, computed })
     }
 }
 
@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_comes_back() {
+    fn a_written_line_is_read_again() {
         // The check value in the CRC's definition.
         assert_eq!(line("123456789"), "123456789 *cbf43926\n");
         for text in ["", "ok", "a *b *c", "tab\tand umlaut \u{e4}"] {
@@ -182,14 +182,14 @@ mod tests {
     }
 
     #[test]
-    fn a_long_line_is_cut_and_still_right() {
+    fn a_long_line_is_cut_and_its_checksum_is_right() {
         let line = line(&"x".repeat(2 * MAX_LINE));
         assert_eq!(line.len(), MAX_LINE + 1);
         assert!(without_checksum(line.trim_end()).is_ok());
     }
 
     #[test]
-    fn any_changed_byte_is_noticed() {
+    fn every_changed_bit_is_found() {
         let good = line("shown 1000 page 1");
         let good = good.trim_end();
         for at in 0..good.len() {

@@ -12,8 +12,8 @@
 //! CR LF. Lines are printable ASCII, at most [`MAX_LINE`] bytes. Backspace and Delete remove the last byte of
 //! the line, and the byte [`CANCEL`] (Ctrl-X) removes all of the line so far.
 //!
-//! The kernel does not echo what it receives: a person at a terminal sees only the answers, and switches the
-//! terminal's own echo on. If a terminal starts each line where the line before ended, it has to add a CR to
+//! The kernel does not echo what it receives: a person at a terminal sees only the answers, and switches
+//! the terminal's echo on. If a terminal starts each line where the line before ended, it has to add a CR to
 //! each LF: `picocom --echo --imap lfcrlf` does both.
 //!
 //! The kernel receives at any time, also while it draws. If the UART has lost a byte of a line, or a byte of
@@ -42,7 +42,7 @@
 //! | `counts` | `frame polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
 //! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `frame 480`, `motion none` (a motion if the frame has faces in reduced quality), `drawn shifts` (the frame's mapper; `none` without a frame), `page 1 start 4b00`, `serial overruns 0 damaged 0 full 0` ([`Reception`]) |
 //! | `version` | `crystal-ball 0.1.0 protocol 7 dump 5` |
-//! | `fail KIND` | no answer: the kernel fails in the named way ([`Fault`]) |
+//! | `fail KIND` | no answer: the kernel fails in the named way ([`FailKind`]) |
 //! | `leave` | no lines; QEMU ends after the `ok` |
 //!
 //! Commands that arrive during an answer are answered after it, in order. The kernel waits for a host that
@@ -53,6 +53,22 @@
 //!   `hello`, if the boot loader has loaded a ramdisk;
 //! - `running`: the first frame is on the screen;
 //! - `panic ...`, `exception ...`, `adapter ...`, and lines with details, then [`END_OF_REPORT`].
+//!
+//! # Example
+//!
+//! ```
+//! use protocol::{Command, FrameName, without_checksum, write_line};
+//!
+//! // The kernel parses a command, with or without a checksum.
+//! let command = Command::parse("show 480").unwrap();
+//! assert_eq!(command, Command::Show(FrameName::Number(480)));
+//!
+//! // It ends each line of its answer in a checksum, which the host verifies.
+//! let mut line = Vec::new();
+//! write_line(format_args!("ok {command}"), |bytes| line.extend_from_slice(bytes));
+//! assert_eq!(line, b"ok show 480 *999dd5b2\n");
+//! assert_eq!(without_checksum("ok show 480 *999dd5b2"), Ok("ok show 480"));
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -63,9 +79,9 @@ mod frame;
 mod lines;
 
 pub use action::{Action, Change};
-pub use command::{Command, CommandError, Content, Fault, FrameName, Motion, Setting, Word};
+pub use command::{Command, CommandError, Content, FailKind, FrameName, Motion, Setting, Word};
 pub use frame::{Checksum, ChecksumError, without_checksum, write_line};
-pub use lines::{Lines, Noise};
+pub use lines::{LineError, Lines};
 
 /// Ticks in a second of the machine's time. The demo draws a frame for each tick, as far as the machine keeps
 /// up.
@@ -152,7 +168,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_exit_has_a_code_of_its_own_and_comes_back_from_it() {
+    fn each_exit_has_a_different_code_and_is_found_by_it() {
         let codes = [
             (Exit::Left, 33),
             (Exit::Panic, 35),
@@ -163,7 +179,7 @@ mod tests {
             assert_eq!(exit.code(), code);
             assert_eq!(Exit::from_code(code), Some(exit));
         }
-        // Exit codes of QEMU's own, of a value that the kernel does not write, and of a signal.
+        // Exit codes of QEMU, of a value that the kernel does not write, and of a signal.
         for code in [0, 1, 31, 34, 41, 139, -1] {
             assert_eq!(Exit::from_code(code), None);
         }

@@ -23,7 +23,7 @@ pub struct Lines {
 
 /// Why a line was discarded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Noise {
+pub enum LineError {
     /// The line is longer than [`MAX_LINE`].
     TooLong,
     /// The line has a byte that is not printable ASCII.
@@ -32,15 +32,22 @@ pub enum Noise {
     Damaged,
 }
 
-impl core::fmt::Display for Noise {
+impl core::fmt::Display for LineError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::TooLong => write!(f, "a line of more than {MAX_LINE} bytes"),
-            Self::NotText(byte) => write!(f, "a line with the byte {byte:02x}"),
-            Self::Damaged => f.write_str("a line with bytes that were lost or damaged on the wire"),
+            Self::TooLong => write!(f, "the line is longer than {MAX_LINE} bytes"),
+            Self::NotText(byte) => write!(
+                f,
+                "the line contains the byte {byte:02x}, which is not printable ASCII"
+            ),
+            Self::Damaged => f.write_str(
+                "bytes of the line were lost or damaged on the wire; send the line again",
+            ),
         }
     }
 }
+
+impl core::error::Error for LineError {}
 
 impl Lines {
     /// Returns an empty buffer.
@@ -53,7 +60,7 @@ impl Lines {
         }
     }
 
-    /// Notes that bytes may be missing here, or that the next byte arrived damaged. The line that the next
+    /// Records that bytes may be missing here, or that the next byte arrived damaged. The line that the next
     /// byte belongs to is refused, unless it is cancelled.
     pub fn damage(&mut self) {
         self.damaged = true;
@@ -62,7 +69,7 @@ impl Lines {
     }
 
     /// Adds a byte. If the byte ends a line, returns the line, or why it was discarded.
-    pub fn push(&mut self, byte: u8) -> Option<Result<&str, Noise>> {
+    pub fn push(&mut self, byte: u8) -> Option<Result<&str, LineError>> {
         let returned = core::mem::replace(&mut self.returned, byte == b'\r');
         match byte {
             b'\n' if returned => None,
@@ -86,15 +93,15 @@ impl Lines {
     }
 
     /// Returns the line so far, and begins the next.
-    fn end(&mut self) -> Result<&str, Noise> {
+    fn end(&mut self) -> Result<&str, LineError> {
         let len = core::mem::take(&mut self.len);
         if core::mem::take(&mut self.damaged) {
-            return Err(Noise::Damaged);
+            return Err(LineError::Damaged);
         }
-        let line = self.bytes.get(..len).ok_or(Noise::TooLong)?;
+        let line = self.bytes.get(..len).ok_or(LineError::TooLong)?;
         match line.iter().find(|byte| !(b' '..=b'~').contains(byte)) {
-            Some(&byte) => Err(Noise::NotText(byte)),
-            None => core::str::from_utf8(line).map_err(|_| Noise::NotText(line[0])),
+            Some(&byte) => Err(LineError::NotText(byte)),
+            None => core::str::from_utf8(line).map_err(|_| LineError::NotText(line[0])),
         }
     }
 }
@@ -112,7 +119,7 @@ mod tests {
     use std::string::{String, ToString};
     use std::vec::Vec;
 
-    fn lines(bytes: &[u8]) -> Vec<Result<String, Noise>> {
+    fn lines(bytes: &[u8]) -> Vec<Result<String, LineError>> {
         let mut lines = Lines::new();
         bytes
             .iter()
@@ -120,7 +127,7 @@ mod tests {
             .collect()
     }
 
-    fn ok(text: &str) -> Result<String, Noise> {
+    fn ok(text: &str) -> Result<String, LineError> {
         Ok(text.to_string())
     }
 
@@ -150,23 +157,23 @@ mod tests {
     }
 
     #[test]
-    fn noise_costs_a_line_and_no_more() {
+    fn an_illegal_line_does_not_affect_the_next_line() {
         let mut bytes = std::vec![b'x'; 1_000_000];
         bytes.extend_from_slice(b"\nshow 1\n\xFF\nc\x1b[A\nhold\n");
         assert_eq!(
             lines(&bytes),
             [
-                Err(Noise::TooLong),
+                Err(LineError::TooLong),
                 ok("show 1"),
-                Err(Noise::NotText(0xFF)),
-                Err(Noise::NotText(0x1B)),
+                Err(LineError::NotText(0xFF)),
+                Err(LineError::NotText(0x1B)),
                 ok("hold"),
             ]
         );
     }
 
     #[test]
-    fn a_cancelled_line_leaves_nothing() {
+    fn a_cancelled_line_leaves_no_bytes_behind() {
         let mut bytes = std::vec![b'x'; 2 * MAX_LINE];
         bytes.extend_from_slice(b"\x18panic\n\xFFab\x18\nc\n");
         assert_eq!(lines(&bytes), ["panic", "", "c"].map(ok));
@@ -179,23 +186,23 @@ mod tests {
             let line = std::format!("{longest}{end}");
             assert_eq!(lines(line.as_bytes()), [Ok(longest)]);
             let line = std::format!("{}{end}", "x".repeat(MAX_LINE + 1));
-            assert_eq!(lines(line.as_bytes()), [Err(Noise::TooLong)]);
+            assert_eq!(lines(line.as_bytes()), [Err(LineError::TooLong)]);
         }
     }
 
     #[test]
-    fn a_damaged_line_is_refused_and_no_other() {
+    fn only_a_damaged_line_is_refused() {
         let mut lines = Lines::new();
-        let mut heard = Vec::new();
+        let mut received = Vec::new();
         for &byte in b"hold\nsho!w 1\rrun\n!show!\n!x\x18run\r!\n" {
             match byte {
                 b'!' => lines.damage(),
-                byte => heard.extend(lines.push(byte).map(|line| line.map(ToString::to_string))),
+                byte => received.extend(lines.push(byte).map(|line| line.map(ToString::to_string))),
             }
         }
-        let damaged = || Err(Noise::Damaged);
+        let damaged = || Err(LineError::Damaged);
         assert_eq!(
-            heard,
+            received,
             [
                 ok("hold"),
                 damaged(),
@@ -228,8 +235,8 @@ mod tests {
                         let text = core::mem::take(&mut line);
                         let bad = text.iter().find(|byte| !(32..127).contains(*byte));
                         expected.push(match bad {
-                            _ if text.len() > MAX_LINE => Err(Noise::TooLong),
-                            Some(&bad) => Err(Noise::NotText(bad)),
+                            _ if text.len() > MAX_LINE => Err(LineError::TooLong),
+                            Some(&bad) => Err(LineError::NotText(bad)),
                             None => Ok(String::from_utf8(text).unwrap()),
                         });
                     }
