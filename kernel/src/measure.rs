@@ -5,13 +5,13 @@
 //! stamp counter and its serial line. Interrupts are off from a request to the end of its answer.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
-use bench::{Bench, Clock, Memory};
+use bench::{Bench, BenchMemory, Clock};
 use bootloader_api::{BootInfo, BootloaderConfig};
 use crystal_ball_kernel::machine::{self, clock, serial};
 use spin::Mutex;
 
 /// The fixed memory of the program.
-static MEMORY: Mutex<Memory> = Mutex::new(Memory::new());
+static MEMORY: Mutex<BenchMemory> = Mutex::new(BenchMemory::new());
 
 /// The boot loader's configuration.
 static BOOT: BootloaderConfig = machine::BOOT;

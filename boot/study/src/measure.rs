@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use anyhow::{Context, bail, ensure};
-use bench::{Ask, Figure, LENGTHS, MAX_ROUNDS, Work};
+use bench::{BenchRequest, Figure, LENGTHS, MAX_ROUNDS, Work};
 use protocol::OK;
 use texmap::{Mapper, Order};
 
@@ -273,7 +273,11 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
         let mut timing = Guest::boot(&ready, cpu, &[])?;
         let mut rows = Vec::new();
         for ((mapper, order), counted) in asked(config).zip(counted) {
-            emulated.compare(mapper, order, &timing.ask(Ask::Check(mapper, order))?)?;
+            emulated.compare(
+                mapper,
+                order,
+                &timing.ask(BenchRequest::Check(mapper, order))?,
+            )?;
             let timed = timing.measure(mapper, order, config.rounds, config.runs)?;
             tick();
             rows.push(Row {
@@ -318,7 +322,7 @@ impl Guest {
     }
 
     /// Sends a request, and returns the lines of the answer without its last line.
-    fn ask(&mut self, ask: Ask) -> anyhow::Result<Vec<String>> {
+    fn ask(&mut self, ask: BenchRequest) -> anyhow::Result<Vec<String>> {
         let ask = ask.to_string();
         self.machine.send_line(&ask)?;
         let mut answer = self.machine.answer(&ask)?;
@@ -336,7 +340,7 @@ impl Guest {
     /// # Errors
     /// If the clock does not count instructions.
     fn ticks_an_instruction(&mut self) -> anyhow::Result<u64> {
-        let answer = self.ask(Ask::Calibrate)?;
+        let answer = self.ask(BenchRequest::Calibrate)?;
         let words: Vec<&str> = answer
             .first()
             .map_or("", String::as_str)
@@ -356,7 +360,7 @@ impl Guest {
     }
 
     fn has_bmi2(&mut self) -> anyhow::Result<bool> {
-        let answer = self.ask(Ask::Calibrate)?;
+        let answer = self.ask(BenchRequest::Calibrate)?;
         Ok(answer.iter().any(|line| line == "bmi2 yes"))
     }
 
@@ -367,15 +371,15 @@ impl Guest {
         rounds: usize,
         runs: bool,
     ) -> anyhow::Result<Told> {
-        let mut figures = self.figures(Ask::Measure(mapper, order, rounds))?;
+        let mut figures = self.figures(BenchRequest::Measure(mapper, order, rounds))?;
         if runs {
-            figures.append(&mut self.figures(Ask::Runs(mapper, order, rounds))?);
+            figures.append(&mut self.figures(BenchRequest::Spans(mapper, order, rounds))?);
         }
         Ok(Told { figures })
     }
 
     /// Requests figures, and returns them by name.
-    fn figures(&mut self, ask: Ask) -> anyhow::Result<BTreeMap<String, Figure>> {
+    fn figures(&mut self, ask: BenchRequest) -> anyhow::Result<BTreeMap<String, Figure>> {
         let answer = self.ask(ask)?;
         let figures = answer.iter().map(|line| {
             let mut words = line.split(' ');
@@ -398,19 +402,19 @@ impl Told {
     /// Returns the costs of all work, with the instructions of `self` and the times of `timed`.
     fn costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<BTreeMap<Work, Cost>> {
         let all = Work::ALL.iter();
-        all.map(|&(name, work)| Ok((work, self.cost(name, timed, a_tick)?)))
+        all.map(|&work| Ok((work, self.cost(&work.to_string(), timed, a_tick)?)))
             .collect()
     }
 
     fn run_costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<Vec<RunCost>> {
-        let name = |length| format!("run-{length}-jobs");
+        let name = |length| format!("span-{length}-jobs");
         let lengths = LENGTHS.into_iter();
         let told = lengths.filter(|&length| self.figures.contains_key(&name(length)));
         told.map(|length| {
             Ok(RunCost {
                 length,
                 jobs: self.cost(&name(length), timed, a_tick)?,
-                draw: self.cost(&format!("run-{length}-draw"), timed, a_tick)?,
+                draw: self.cost(&format!("span-{length}-draw"), timed, a_tick)?,
             })
         })
         .collect()

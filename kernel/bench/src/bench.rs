@@ -8,9 +8,9 @@ use protocol::{Checksum, ERROR, Lines, OK};
 use scene::{Pose, Stage, Storage};
 use texmap::{Job, JobList, Mapper, Order, Stats, Texture};
 
-use crate::line::{Ask, Figure};
+use crate::request::{BenchRequest, Figure};
 use crate::screen::{self, Screen};
-use crate::work::{Place, Work};
+use crate::work::{Target, Work};
 
 /// The measured frame of the scene `ball`.
 pub const FRAME: u32 = 480;
@@ -42,7 +42,7 @@ pub struct Clock {
 /// The fixed memory of the bench, about 2.5 MiB. It is zero at first and meant for a static, which then
 /// occupies no space in an image.
 #[derive(Clone, Copy, Debug)]
-pub struct Memory {
+pub struct BenchMemory {
     ball: [u8; scene::TEXELS],
     storage: Storage,
     square: [u8; screen::TEXELS],
@@ -51,7 +51,7 @@ pub struct Memory {
     offscreen: Offscreen,
 }
 
-impl Memory {
+impl BenchMemory {
     /// Returns empty memory.
     pub const fn new() -> Self {
         Self {
@@ -65,7 +65,7 @@ impl Memory {
     }
 }
 
-impl Default for Memory {
+impl Default for BenchMemory {
     fn default() -> Self {
         Self::new()
     }
@@ -93,7 +93,7 @@ impl<'a, B: Bus> Bench<'a, B> {
     ///
     /// # Errors
     /// As [`ModeX::set`].
-    pub fn new(memory: &'a mut Memory, bus: B) -> Result<Self, SetError> {
+    pub fn new(memory: &'a mut BenchMemory, bus: B) -> Result<Self, SetError> {
         let ball = [scene::paint_ball(&mut memory.ball)];
         let stage = Stage::new(&mut memory.storage, scene::ball(&ball));
         let card = ModeX::set(bus, stage.palette())?;
@@ -125,18 +125,18 @@ impl<'a, B: Bus> Bench<'a, B> {
     /// Handles a byte from the serial line. If the byte ends a line, answers the line. Returns true if the
     /// line was `leave`.
     pub fn receive(&mut self, byte: u8, clock: &Clock, out: &mut Out<'_>) -> bool {
-        let ask = match self.lines.push(byte) {
+        let request = match self.lines.push(byte) {
             None => return false,
-            Some(Ok(line)) => Ask::parse(line),
+            Some(Ok(line)) => BenchRequest::parse(line),
             Some(Err(noise)) => {
                 out(format_args!("{ERROR} {noise}"));
                 return false;
             }
         };
-        match ask {
-            Ok(ask) => {
-                self.answer(ask, clock, out);
-                ask == Ask::Leave
+        match request {
+            Ok(request) => {
+                self.answer(request, clock, out);
+                request == BenchRequest::Leave
             }
             Err(error) => {
                 out(format_args!("{ERROR} {error}"));
@@ -146,13 +146,13 @@ impl<'a, B: Bus> Bench<'a, B> {
     }
 
     /// Carries a request out, and then writes its answer.
-    pub fn answer(&mut self, ask: Ask, clock: &Clock, out: &mut Out<'_>) {
-        match ask {
-            Ask::Calibrate => {
-                let took = |count| ticks(clock.now, &mut || (clock.instructions)(count));
+    pub fn answer(&mut self, request: BenchRequest, clock: &Clock, out: &mut Out<'_>) {
+        match request {
+            BenchRequest::Calibrate => {
+                let measure = |count| ticks(clock.now, &mut || (clock.instructions)(count));
                 // Runs once to warm up. The difference of two counts cancels the cost of the call.
-                took(KNOWN);
-                let [more, less] = [2 * KNOWN, KNOWN].map(took);
+                measure(KNOWN);
+                let [more, less] = [2 * KNOWN, KNOWN].map(measure);
                 out(format_args!(
                     "instructions {KNOWN} ticks {}",
                     more.saturating_sub(less)
@@ -160,34 +160,34 @@ impl<'a, B: Bus> Bench<'a, B> {
                 let bmi2 = if clock.bmi2 { "yes" } else { "no" };
                 out(format_args!("bmi2 {bmi2}"));
             }
-            Ask::Measure(mapper, order, rounds) => {
+            BenchRequest::Measure(mapper, order, rounds) => {
                 self.set(mapper, order);
-                let figures = self.measure(rounds, clock.now);
-                for ((name, _), figure) in Work::ALL.iter().zip(figures) {
-                    out(format_args!("{name} {figure}"));
+                let figures = self.measure_work(rounds, clock.now);
+                for (work, figure) in Work::ALL.iter().zip(figures) {
+                    out(format_args!("{work} {figure}"));
                 }
             }
-            Ask::Runs(mapper, order, rounds) => {
+            BenchRequest::Spans(mapper, order, rounds) => {
                 self.set(mapper, order);
-                let figures = LENGTHS.map(|length| self.runs(length, rounds, clock.now));
+                let figures = LENGTHS.map(|length| self.measure_spans(length, rounds, clock.now));
                 for (length, [jobs, draw]) in LENGTHS.iter().zip(figures) {
-                    out(format_args!("run-{length}-jobs {jobs}"));
-                    out(format_args!("run-{length}-draw {draw}"));
+                    out(format_args!("span-{length}-jobs {jobs}"));
+                    out(format_args!("span-{length}-draw {draw}"));
                 }
             }
-            Ask::Check(mapper, order) => {
+            BenchRequest::Check(mapper, order) => {
                 self.set(mapper, order);
-                for (name, work) in Work::ALL {
+                for &work in Work::ALL {
                     self.prepare(work);
                     self.run(work, || 0);
-                    if let Some(sum) = self.checksum(work.place()) {
-                        out(format_args!("{name} crc {sum:08x}"));
+                    if let Some(sum) = self.checksum(work.target()) {
+                        out(format_args!("{work} crc {sum:08x}"));
                     }
                 }
             }
-            Ask::Leave => {}
+            BenchRequest::Leave => {}
         }
-        out(format_args!("{OK} {ask}"));
+        out(format_args!("{OK} {request}"));
     }
 
     /// Sets the mapper and the order of the work that follows.
@@ -301,9 +301,10 @@ impl<'a, B: Bus> Bench<'a, B> {
 
     /// Measures every piece of work once in each round, one after the other, so that a drift of the host
     /// affects all of them alike. The first round is a warm-up and is not counted.
-    fn measure(&mut self, rounds: usize, now: fn() -> u64) -> [Figure; Work::ALL.len()] {
+    fn measure_work(&mut self, rounds: usize, now: fn() -> u64) -> [Figure; Work::ALL.len()] {
         let ball = self.pixels_of_the_ball();
-        let mut figures = Work::ALL.map(|(_, work)| {
+        let mut figures = core::array::from_fn(|i| {
+            let work = Work::ALL[i];
             let pixels = if work.is_of_the_ball() {
                 ball
             } else {
@@ -312,7 +313,7 @@ impl<'a, B: Bus> Bench<'a, B> {
             Figure::new(pixels as u64 * u64::from(work.frames()))
         });
         for round in 0..=rounds {
-            for (figure, (_, work)) in figures.iter_mut().zip(Work::ALL) {
+            for (figure, &work) in figures.iter_mut().zip(Work::ALL) {
                 self.prepare(work);
                 let pair = ticks(now, &mut || ());
                 let ticks = self.run(work, now).saturating_sub(pair * pairs(work));
@@ -325,7 +326,7 @@ impl<'a, B: Bus> Bench<'a, B> {
     }
 
     /// Measures a face whose spans are all `length` pixels long: making its jobs, and drawing them in RAM.
-    fn runs(&mut self, length: u16, rounds: usize, now: fn() -> u64) -> [Figure; 2] {
+    fn measure_spans(&mut self, length: u16, rounds: usize, now: fn() -> u64) -> [Figure; 2] {
         let (mapper, order) = (self.stage.mapper(), self.stage.order());
         let Self {
             screen,
@@ -343,15 +344,15 @@ impl<'a, B: Bus> Bench<'a, B> {
         let mut figures = [Figure::new(pixels(jobs.jobs())); 2];
         for round in 0..=rounds {
             let pair = ticks(now, &mut || ());
-            let took = [
+            let measured = [
                 ticks(now, &mut || make_jobs(&face, mapper, square, jobs)),
                 ticks(now, &mut || {
                     order.draw(jobs, &square[..], *page, mapper);
                 }),
             ];
-            for (figure, took) in figures.iter_mut().zip(took) {
+            for (figure, ticks) in figures.iter_mut().zip(measured) {
                 if round > 0 {
-                    figure.add(took.saturating_sub(pair));
+                    figure.add(ticks.saturating_sub(pair));
                 }
             }
         }
@@ -368,18 +369,18 @@ impl<'a, B: Bus> Bench<'a, B> {
         self.stage.draw(&self.pose, self.offscreen).pixels as usize
     }
 
-    /// Returns the CRC-32 of the frame at a place, pixel by pixel from the top left.
-    fn checksum(&mut self, place: Place) -> Option<u32> {
+    /// Returns the CRC-32 of the frame in a target, pixel by pixel from the top left.
+    fn checksum(&mut self, target: Target) -> Option<u32> {
         let mut sum = Checksum::new();
         for y in 0..HEIGHT {
             let mut row = [0; WIDTH];
-            match place {
-                Place::Nowhere => return None,
-                Place::Page => row = core::array::from_fn(|x| self.page.pixel(x, y)),
-                Place::Offscreen => {
+            match target {
+                Target::Nothing => return None,
+                Target::Page => row = core::array::from_fn(|x| self.page.pixel(x, y)),
+                Target::Offscreen => {
                     row = core::array::from_fn(|x| self.offscreen.page().pixel(x, y));
                 }
-                Place::Card => {
+                Target::Card => {
                     let at = usize::from(self.card.start_address()) + y * modex::STRIDE;
                     self.card.load(at as u16, &mut row);
                 }
@@ -427,7 +428,11 @@ fn make_jobs(
         jobs.push(job)
             .expect("the list has room for a screen's jobs");
     });
-    assert_eq!(made, Ok(()), "{mapper} does not take the screen's face");
+    assert_eq!(
+        made,
+        Ok(()),
+        "{mapper} dropped the face that fills the screen"
+    );
 }
 
 fn pixels(jobs: &[Job]) -> u64 {

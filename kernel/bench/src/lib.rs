@@ -14,17 +14,29 @@
 //! | --- | --- |
 //! | `calibrate` | `instructions 4000000 ticks 4000000`, and whether the CPU has BMI2: `bmi2 no` |
 //! | `measure affine planes 5` | for each [`Work`] its pixels and the ticks of each round: `screen-ram pixels 76800 ticks 5 5 5 5 5` |
-//! | `runs affine planes 5` | for each of [`LENGTHS`] the same of `run-8-jobs` and `run-8-draw` |
+//! | `spans affine planes 5` | for each of [`LENGTHS`] the same of `span-8-jobs` and `span-8-draw` |
 //! | `check affine planes` | for each work that draws the CRC-32 of its frame: `screen-ram crc 5d41402a` |
 //! | `leave` | no lines; QEMU ends after the `ok` |
+//!
+//! # Example
+//!
+//! ```
+//! use bench::{BenchRequest, Figure};
+//!
+//! let request = BenchRequest::parse("measure affine planes 5").unwrap();
+//! assert_eq!(request.to_string(), "measure affine planes 5");
+//!
+//! let figure = Figure::parse("pixels 76800 ticks 5 4 6".split(' ')).unwrap();
+//! assert_eq!((figure.pixels(), figure.ticks()), (76_800, &[5, 4, 6][..]));
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 
 mod bench;
-mod line;
+mod request;
 mod screen;
 mod work;
 
-pub use bench::{Bench, Clock, FRAME, LENGTHS, Memory, Out};
-pub use line::{Ask, AskError, Figure, MAX_ROUNDS};
-pub use work::{Place, Work};
+pub use bench::{Bench, BenchMemory, Clock, FRAME, LENGTHS, Out};
+pub use request::{BenchRequest, BenchRequestError, Figure, MAX_ROUNDS};
+pub use work::{Target, Work};

@@ -1,9 +1,14 @@
 //! The pieces of work that are measured, by name.
 
-use core::fmt;
+use strum::{Display, VariantArray};
 
 /// A piece of work. It can be repeated, and each repetition carries out the same instructions.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+///
+/// The variants are in the order of a round. Work that fills the whole screen of the card comes before
+/// [`Work::Present`], whose preparation puts the ball on every page. So the work on the ball that follows
+/// erases only the ball.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Display, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 pub enum Work {
     /// Store a constant in every pixel of the screen in RAM, column by column.
     BareRam,
@@ -32,11 +37,11 @@ pub enum Work {
     FramePresented,
 }
 
-/// The place where a piece of work leaves its frame.
+/// Where a piece of work draws its frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Place {
-    /// No place: the work draws no pixels.
-    Nowhere,
+pub enum Target {
+    /// Nowhere: the work draws no pixels.
+    Nothing,
     /// The page in RAM for the face that fills the screen.
     Page,
     /// The page in RAM that is presented.
@@ -46,29 +51,8 @@ pub enum Place {
 }
 
 impl Work {
-    /// All pieces of work with their names, in the order of a round. Work that fills the whole screen of the
-    /// card comes before [`Work::Present`], whose preparation puts the ball on every page. So the work on the
-    /// ball that follows erases only the ball.
-    pub const ALL: [(&'static str, Self); 12] = [
-        ("bare-ram", Self::BareRam),
-        ("bare-card", Self::BareCard),
-        ("screen-jobs", Self::ScreenJobs),
-        ("screen-ram", Self::ScreenRam),
-        ("screen-card", Self::ScreenCard),
-        ("present", Self::Present),
-        ("frame-card", Self::FrameCard),
-        ("frame-faces", Self::FrameFaces),
-        ("frame-jobs", Self::FrameJobs),
-        ("frame-draw-card", Self::FrameDrawCard),
-        ("frame-draw-ram", Self::FrameDrawRam),
-        ("frame-presented", Self::FramePresented),
-    ];
-
-    /// Returns the piece of work with a name.
-    pub fn parse(name: &str) -> Option<Self> {
-        let named = Self::ALL.iter().find(|(known, _)| *known == name);
-        named.map(|&(_, work)| work)
-    }
+    /// All pieces of work, in the order of a round.
+    pub const ALL: &'static [Self] = Self::VARIANTS;
 
     /// Returns the number of frames that the work draws, each with the same pixels.
     ///
@@ -87,20 +71,13 @@ impl Work {
         self >= Self::Present
     }
 
-    /// Returns the place where the work leaves its frame.
-    pub fn place(self) -> Place {
+    /// Returns where the work draws its frame.
+    pub fn target(self) -> Target {
         match self {
-            Self::ScreenJobs | Self::FrameFaces | Self::FrameJobs => Place::Nowhere,
-            Self::BareRam | Self::ScreenRam => Place::Page,
-            Self::FrameDrawRam => Place::Offscreen,
-            _ => Place::Card,
+            Self::ScreenJobs | Self::FrameFaces | Self::FrameJobs => Target::Nothing,
+            Self::BareRam | Self::ScreenRam => Target::Page,
+            Self::FrameDrawRam => Target::Offscreen,
+            _ => Target::Card,
         }
-    }
-}
-
-impl fmt::Display for Work {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let named = Self::ALL.iter().find(|(_, work)| work == self);
-        f.write_str(named.map_or("unnamed", |(name, _)| name))
     }
 }

@@ -4,7 +4,7 @@
 //! VGA whose accesses are counted. The checksums of the frames prove that both did the same work.
 
 use anyhow::{bail, ensure};
-use bench::{Ask, Bench, Clock, Memory, Work};
+use bench::{Bench, BenchMemory, BenchRequest, Clock, Work};
 use in_place::InPlace;
 use modex::{Bus, Counted, Tally};
 use texmap::{Mapper, Order};
@@ -26,13 +26,13 @@ pub struct Accesses {
 /// The memory that the benches on the emulated VGAs borrow.
 #[derive(Debug)]
 pub struct Memories {
-    counted: InPlace<Memory>,
-    plain: InPlace<Memory>,
+    counted: InPlace<BenchMemory>,
+    plain: InPlace<BenchMemory>,
 }
 
 impl Default for Memories {
     fn default() -> Self {
-        let counted = in_place::boxed!(Memory);
+        let counted = in_place::boxed!(BenchMemory);
         let plain = counted.clone();
         Self { counted, plain }
     }
@@ -140,7 +140,7 @@ impl<'a> Emulated<'a> {
 /// Returns the lines of the answer to `check`, without its last line.
 fn check<B: Bus>(bench: &mut Bench<'_, B>, mapper: Mapper, order: Order) -> Vec<String> {
     let mut answer = Vec::new();
-    bench.answer(Ask::Check(mapper, order), &NO_CLOCK, &mut |line| {
+    bench.answer(BenchRequest::Check(mapper, order), &NO_CLOCK, &mut |line| {
         answer.push(line.to_string());
     });
     answer.pop();

@@ -10,14 +10,14 @@ pub const MAX_ROUNDS: usize = 15;
 
 /// A request, as a line contains it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ask {
+pub enum BenchRequest {
     /// `calibrate`: measure the clock with a known number of instructions.
     Calibrate,
     /// `measure MAPPER ORDER ROUNDS`: measure each [`crate::Work`] in this many rounds, after a warm-up
     /// round.
     Measure(Mapper, Order, usize),
-    /// `runs MAPPER ORDER ROUNDS`: measure faces whose spans all have one length, in RAM.
-    Runs(Mapper, Order, usize),
+    /// `spans MAPPER ORDER ROUNDS`: measure faces whose spans all have one length, in RAM.
+    Spans(Mapper, Order, usize),
     /// `check MAPPER ORDER`: print the checksum of what each work draws.
     Check(Mapper, Order),
     /// `leave`: end QEMU with the code for success.
@@ -26,67 +26,67 @@ pub enum Ask {
 
 /// Why a line is not a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AskError {
+pub enum BenchRequestError {
     /// The line is not one of the five requests.
     Unknown,
     /// The line has a checksum, which is wrong.
     Checksum(ChecksumError),
 }
 
-impl fmt::Display for AskError {
+impl fmt::Display for BenchRequestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Unknown => write!(
                 f,
-                "there are calibrate, measure MAPPER ORDER ROUNDS, runs MAPPER ORDER ROUNDS, \
-                 check MAPPER ORDER, leave; rounds are 1 to {MAX_ROUNDS}"
+                "unknown request; use calibrate, measure MAPPER ORDER ROUNDS, spans MAPPER ORDER ROUNDS, \
+                 check MAPPER ORDER or leave; ROUNDS is 1 to {MAX_ROUNDS}"
             ),
             Self::Checksum(error) => error.fmt(f),
         }
     }
 }
 
-impl Ask {
+impl BenchRequest {
     /// Parses a line, and checks its checksum if it has one.
     ///
     /// # Errors
     /// The line is not a request.
-    pub fn parse(line: &str) -> Result<Self, AskError> {
+    pub fn parse(line: &str) -> Result<Self, BenchRequestError> {
         let text = match without_checksum(line) {
             Ok(text) => text,
             Err(ChecksumError::NoChecksum) => line,
-            Err(wrong) => return Err(AskError::Checksum(wrong)),
+            Err(wrong) => return Err(BenchRequestError::Checksum(wrong)),
         };
-        Self::words(text.split(' ')).ok_or(AskError::Unknown)
+        Self::parse_words(text.split(' ')).ok_or(BenchRequestError::Unknown)
     }
 
-    fn words<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
-        let ask = words.next()?;
-        let mut how = || Some((Mapper::parse(words.next()?)?, Order::parse(words.next()?)?));
-        let mut ask = match ask {
+    fn parse_words<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Self> {
+        let name = words.next()?;
+        let mut options = || Some((Mapper::parse(words.next()?)?, Order::parse(words.next()?)?));
+        let mut request = match name {
             "calibrate" => Self::Calibrate,
             "leave" => Self::Leave,
-            "measure" => how().map(|(mapper, order)| Self::Measure(mapper, order, 0))?,
-            "runs" => how().map(|(mapper, order)| Self::Runs(mapper, order, 0))?,
-            "check" => how().map(|(mapper, order)| Self::Check(mapper, order))?,
+            "measure" => options().map(|(mapper, order)| Self::Measure(mapper, order, 0))?,
+            "spans" => options().map(|(mapper, order)| Self::Spans(mapper, order, 0))?,
+            "check" => options().map(|(mapper, order)| Self::Check(mapper, order))?,
             _ => return None,
         };
-        if let Self::Measure(_, _, rounds) | Self::Runs(_, _, rounds) = &mut ask {
+        if let Self::Measure(_, _, rounds) | Self::Spans(_, _, rounds) = &mut request {
             *rounds = words.next()?.parse().ok()?;
             if !(1..=MAX_ROUNDS).contains(rounds) {
                 return None;
             }
         }
-        words.next().is_none().then_some(ask)
+        words.next().is_none().then_some(request)
     }
 }
 
-impl fmt::Display for Ask {
+impl fmt::Display for BenchRequest {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Calibrate => f.write_str("calibrate"),
             Self::Measure(mapper, order, rounds) => write!(f, "measure {mapper} {order} {rounds}"),
-            Self::Runs(mapper, order, rounds) => write!(f, "runs {mapper} {order} {rounds}"),
+            Self::Spans(mapper, order, rounds) => write!(f, "spans {mapper} {order} {rounds}"),
             Self::Check(mapper, order) => write!(f, "check {mapper} {order}"),
             Self::Leave => f.write_str("leave"),
         }
@@ -166,22 +166,22 @@ mod tests {
     use std::string::ToString;
 
     #[test]
-    fn every_ask_comes_back() {
-        let mut asks = std::vec![Ask::Calibrate, Ask::Leave];
+    fn every_request_is_parsed_from_its_text() {
+        let mut requests = std::vec![BenchRequest::Calibrate, BenchRequest::Leave];
         for &(_, mapper, _) in Mapper::ALL {
             for (_, order, _) in Order::ALL {
-                asks.push(Ask::Measure(mapper, order, 5));
-                asks.push(Ask::Runs(mapper, order, MAX_ROUNDS));
-                asks.push(Ask::Check(mapper, order));
+                requests.push(BenchRequest::Measure(mapper, order, 5));
+                requests.push(BenchRequest::Spans(mapper, order, MAX_ROUNDS));
+                requests.push(BenchRequest::Check(mapper, order));
             }
         }
-        for ask in asks {
-            assert_eq!(Ask::parse(&ask.to_string()), Ok(ask));
+        for request in requests {
+            assert_eq!(BenchRequest::parse(&request.to_string()), Ok(request));
         }
     }
 
     #[test]
-    fn what_asks_for_nothing_is_refused() {
+    fn an_illegal_request_is_refused() {
         for line in [
             "",
             "measure",
@@ -197,14 +197,18 @@ mod tests {
             "leave now",
             "show 480",
         ] {
-            assert_eq!(Ask::parse(line), Err(AskError::Unknown), "{line:?}");
+            assert_eq!(
+                BenchRequest::parse(line),
+                Err(BenchRequestError::Unknown),
+                "{line:?}"
+            );
         }
-        let wrong = Ask::parse("leave *00000000");
-        assert!(matches!(wrong, Err(AskError::Checksum(_))));
+        let wrong = BenchRequest::parse("leave *00000000");
+        assert!(matches!(wrong, Err(BenchRequestError::Checksum(_))));
     }
 
     #[test]
-    fn a_figure_comes_back() {
+    fn a_figure_is_parsed_from_its_text() {
         let mut figure = Figure::new(76_800);
         for ticks in [0, 7, u64::MAX] {
             figure.add(ticks);
