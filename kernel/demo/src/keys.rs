@@ -27,111 +27,34 @@ pub struct Key {
 }
 
 /// All keys that have an action. Each action has one entry, except the hint, which has no key.
+///
+/// Kept by hand, because each entry has a description and key codes.
+#[rustfmt::skip]
 pub const KEYS: &[Key] = &[
-    key(
-        "Left",
-        [KeyCode::ArrowLeft; 2],
-        Action::YawLeft,
-        "turn to the left",
-    ),
-    key(
-        "Right",
-        [KeyCode::ArrowRight; 2],
-        Action::YawRight,
-        "turn to the right",
-    ),
+    key("Left", [KeyCode::ArrowLeft; 2], Action::YawLeft, "turn to the left"),
+    key("Right", [KeyCode::ArrowRight; 2], Action::YawRight, "turn to the right"),
     key("Up", [KeyCode::ArrowUp; 2], Action::PitchUp, "turn up"),
-    key(
-        "Down",
-        [KeyCode::ArrowDown; 2],
-        Action::PitchDown,
-        "turn down",
-    ),
+    key("Down", [KeyCode::ArrowDown; 2], Action::PitchDown, "turn down"),
     key("A", [KeyCode::A; 2], Action::RollLeft, "lean to the left"),
     key("D", [KeyCode::D; 2], Action::RollRight, "lean to the right"),
-    key(
-        "+",
-        [KeyCode::OemPlus, KeyCode::NumpadAdd],
-        Action::Faster,
-        "faster",
-    ),
-    key(
-        "-",
-        [KeyCode::OemMinus, KeyCode::NumpadSubtract],
-        Action::Slower,
-        "slower",
-    ),
-    key(
-        "0",
-        [KeyCode::Key0, KeyCode::Numpad0],
-        Action::Stop,
-        "stop turning",
-    ),
-    key(
-        "Space",
-        [KeyCode::Spacebar; 2],
-        Action::Pause,
-        "pause and resume",
-    ),
-    key(
-        "S",
-        [KeyCode::S; 2],
-        Action::Step,
-        "pause, then a tick at a time",
-    ),
+    key("+", [KeyCode::OemPlus, KeyCode::NumpadAdd], Action::Faster, "faster"),
+    key("-", [KeyCode::OemMinus, KeyCode::NumpadSubtract], Action::Slower, "slower"),
+    key("0", [KeyCode::Key0, KeyCode::Numpad0], Action::Stop, "stop turning"),
+    key("Space", [KeyCode::Spacebar; 2], Action::Pause, "pause and resume"),
+    key("S", [KeyCode::S; 2], Action::Step, "pause, then a tick at a time"),
     key("PgUp", [KeyCode::PageUp; 2], Action::Nearer, "nearer"),
     key("PgDn", [KeyCode::PageDown; 2], Action::Farther, "farther"),
     key("N", [KeyCode::N; 2], Action::NextScene, "next scene"),
     key("M", [KeyCode::M; 2], Action::NextMapper, "next mapper"),
     key("B", [KeyCode::B; 2], Action::LastMapper, "previous mapper"),
-    key(
-        "F",
-        [KeyCode::F; 2],
-        Action::Finer,
-        "finer: half the error of within-T",
-    ),
-    key(
-        "C",
-        [KeyCode::C; 2],
-        Action::Coarser,
-        "coarser: twice the error",
-    ),
-    key(
-        "O",
-        [KeyCode::O; 2],
-        Action::NextOrder,
-        "next order: polygons, planes, buffer",
-    ),
-    key(
-        "L",
-        [KeyCode::L; 2],
-        Action::Quality,
-        "reduced quality while it moves",
-    ),
-    key(
-        "H",
-        [KeyCode::H, KeyCode::F1],
-        Action::Help,
-        "help: the keys",
-    ),
-    key(
-        "I",
-        [KeyCode::I; 2],
-        Action::Info,
-        "info: figures of the frame",
-    ),
-    key(
-        "X",
-        [KeyCode::X; 2],
-        Action::Split,
-        "split: current, exact, error",
-    ),
-    key(
-        "R",
-        [KeyCode::R; 2],
-        Action::Reset,
-        "reset everything but the scene",
-    ),
+    key("F", [KeyCode::F; 2], Action::Finer, "finer: half the error of within-T"),
+    key("C", [KeyCode::C; 2], Action::Coarser, "coarser: twice the error"),
+    key("O", [KeyCode::O; 2], Action::NextOrder, "next order: polygons, planes, buffer"),
+    key("L", [KeyCode::L; 2], Action::Quality, "reduced quality while it moves"),
+    key("H", [KeyCode::H, KeyCode::F1], Action::Help, "help: the keys"),
+    key("I", [KeyCode::I; 2], Action::Info, "info: figures of the frame"),
+    key("X", [KeyCode::X; 2], Action::Split, "split: current, exact, error"),
+    key("R", [KeyCode::R; 2], Action::Reset, "reset everything but the scene"),
 ];
 
 const fn key(name: &'static str, codes: [KeyCode; 2], action: Action, about: &'static str) -> Key {
@@ -179,7 +102,7 @@ impl Keyboard {
 
     /// Handles a code. Returns the action if the code completes a push that has one.
     pub fn push(&mut self, code: u8) -> Option<Action> {
-        // An invalid code is ignored; the decoder starts afresh with the next code.
+        // An invalid code is ignored; the decoder starts again with the next code.
         let event = self.set.advance_state(code).ok()??;
         let bit = 1u128 << (event.code as u8 & 127);
         let again = self.down & bit != 0;
@@ -223,11 +146,11 @@ mod tests {
     }
 
     #[test]
-    fn every_action_has_a_key_and_no_key_two() {
+    fn every_action_has_one_key_and_every_key_one_action() {
         for &action in Action::ALL {
-            let with = KEYS.iter().filter(|key| key.action == action);
-            let one = usize::from(action != Action::Hint);
-            assert_eq!(with.count(), one, "{action}");
+            let keys = KEYS.iter().filter(|key| key.action == action);
+            let expected = usize::from(action != Action::Hint);
+            assert_eq!(keys.count(), expected, "{action}");
         }
         let mut codes: Vec<_> = KEYS.iter().flat_map(|key| key.codes).collect();
         let all = codes.len();
@@ -240,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn repeats_turn_on_and_toggle_nothing() {
+    fn a_repeat_turns_and_does_not_toggle() {
         let mut keyboard = Keyboard::new();
         let left = [EXTENDED, LEFT];
         let held = actions(&mut keyboard, &[left; 5].concat());
@@ -254,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_lost_costs_a_push_at_most() {
+    fn a_lost_code_costs_at_most_one_push() {
         // The release was lost.
         let mut keyboard = Keyboard::new();
         assert_eq!(
@@ -271,7 +194,7 @@ mod tests {
 
     /// Any bytes: no panic, and a key works afterwards.
     #[test]
-    fn noise_is_harmless() {
+    fn after_any_codes_a_key_still_works() {
         let mut random = seeded::generator();
         for _ in 0..1000 {
             let mut keyboard = Keyboard::new();
