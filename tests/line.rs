@@ -339,7 +339,7 @@ fn noise_on_the_line_is_answered_and_survived() {
         (b"show 4294967296\n".to_vec(), "use 'show FRAME'"),
         (
             b"show pose 0 0 0 ffffffff\n".to_vec(),
-            "a distance is 0 to 00800000",
+            "is out of range; use 0 to 00800000",
         ),
         (b"shew 1\n".to_vec(), "unknown command 'shew'"),
         (b"show 1 *00000000\n".to_vec(), "has checksum 00000000"),

@@ -12,13 +12,13 @@
 
 use bootloader_api::{BootInfo, BootloaderConfig};
 use crystal_ball_kernel::machine::{self, clock, keyboard, serial, timer};
-use demo::{Memory, Request, Show};
+use demo::{Demo, DemoMemory, Request};
 use model::ModelFile;
 use protocol::{LOADED, REFUSED};
 use spin::Mutex;
 
 /// The fixed memory of the program.
-static MEMORY: Mutex<Memory> = Mutex::new(Memory::new());
+static MEMORY: Mutex<DemoMemory> = Mutex::new(DemoMemory::new());
 
 /// The boot loader's configuration.
 static BOOT: BootloaderConfig = machine::BOOT;
@@ -26,32 +26,32 @@ static BOOT: BootloaderConfig = machine::BOOT;
 fn start(boot_info: &'static mut BootInfo) -> ! {
     let machine = machine::init(boot_info);
     let mut memory = MEMORY.lock();
-    let model_file = machine.ramdisk.and_then(taken);
-    let mut show = Show::new(&mut memory, machine.vga, model_file.as_ref())
+    let model_file = machine.ramdisk.and_then(model_file_of);
+    let mut demo = Demo::new(&mut memory, machine.vga, model_file.as_ref())
         .unwrap_or_else(|error| machine::report::adapter(error));
     let out: &mut demo::Out<'_> = &mut |line| serial::line(line);
     let stopwatch = clock::Stopwatch::start(timer::ticks());
     loop {
         while let Some(received) = serial::receive() {
             if received.damaged {
-                show.damage();
+                demo.damage();
             }
-            show.set_reception(serial::reception());
-            match show.receive(received.byte, timer::ticks(), out) {
+            demo.set_reception(serial::reception());
+            match demo.receive(received.byte, timer::ticks(), out) {
                 Some(Request::Fail(kind)) => machine::fail(kind),
                 Some(Request::Leave) => machine::exit(protocol::Exit::Left),
                 None => {}
             }
         }
         while let Some(code) = keyboard::receive() {
-            show.key(code, timer::ticks());
+            demo.key(code, timer::ticks());
         }
-        show.set_lost_keys(keyboard::lost());
+        demo.set_lost_keys(keyboard::lost());
         let tick = timer::ticks();
-        if show.is_due(tick) {
+        if demo.is_due(tick) {
             let before = clock::now();
-            show.present(tick, out);
-            show.took(stopwatch.micros(before, timer::ticks()));
+            demo.present(tick, out);
+            demo.add_frame_time(stopwatch.micros(before, timer::ticks()));
         } else {
             machine::sleep_while(|| {
                 timer::ticks() == tick && !serial::has_received() && !keyboard::has_received()
@@ -60,9 +60,9 @@ fn start(boot_info: &'static mut BootInfo) -> ! {
     }
 }
 
-/// Returns the ramdisk's model file, and writes its checksum. A damaged model file is reported with its reason; the
-/// built-in scenes still work.
-fn taken(ramdisk: &'static [u8]) -> Option<ModelFile<'static>> {
+/// Returns the ramdisk's model file, and writes its checksum. A damaged model file is reported with its
+/// reason; the built-in scenes still work.
+fn model_file_of(ramdisk: &'static [u8]) -> Option<ModelFile<'static>> {
     match ModelFile::parse(ramdisk) {
         Ok(model_file) => {
             serial::line(format_args!("{LOADED} model {:08x}", model_file.checksum()));

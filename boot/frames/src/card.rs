@@ -7,7 +7,7 @@
 //! its geometry comes from its registers.
 
 use anyhow::{Context, anyhow, bail};
-use demo::{Memory, Show};
+use demo::{Demo, DemoMemory};
 use in_place::InPlace;
 use model::ModelFile;
 use protocol::dump::{Header, PLANE_BYTES};
@@ -22,8 +22,8 @@ use vga::widen;
 
 /// Returns empty memory for the demo. It is built in place, because its size of about 4 MiB exceeds a
 /// thread's stack.
-pub fn memory() -> InPlace<Memory> {
-    in_place::boxed!(Memory)
+pub fn memory() -> InPlace<DemoMemory> {
+    in_place::boxed!(DemoMemory)
 }
 
 /// A VGA with the demo running on it.
@@ -73,7 +73,7 @@ pub trait Card {
 /// The demo on the emulated VGA.
 #[derive(Debug)]
 pub struct Emulated<'a> {
-    show: Show<'a, Vga>,
+    demo: Demo<'a, Vga>,
     /// The checksum of the model file, if one is loaded.
     model_file: Option<u32>,
 }
@@ -83,7 +83,7 @@ impl<'a> Emulated<'a> {
     ///
     /// # Errors
     /// The fault that the emulated VGA finds in the mode set.
-    pub fn new(memory: &'a mut Memory) -> anyhow::Result<Self> {
+    pub fn new(memory: &'a mut DemoMemory) -> anyhow::Result<Self> {
         Self::with(memory, None)
     }
 
@@ -92,11 +92,11 @@ impl<'a> Emulated<'a> {
     /// # Errors
     /// As [`Emulated::new`].
     pub fn with(
-        memory: &'a mut Memory,
+        memory: &'a mut DemoMemory,
         model_file: Option<&ModelFile<'a>>,
     ) -> anyhow::Result<Self> {
         let mut this = Self {
-            show: Show::new(memory, Vga::new(), model_file)?,
+            demo: Demo::new(memory, Vga::new(), model_file)?,
             model_file: model_file.map(ModelFile::checksum),
         };
         this.ask(Command::Hold)?;
@@ -105,7 +105,7 @@ impl<'a> Emulated<'a> {
 
     /// Returns the emulated VGA.
     pub fn vga(&mut self) -> &mut Vga {
-        self.show.bus()
+        self.demo.bus()
     }
 }
 
@@ -113,9 +113,9 @@ impl Card for Emulated<'_> {
     fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
         let mut answer = Vec::new();
         let request = self
-            .show
+            .demo
             .obey(command, 0, &mut |line| answer.push(line.to_string()));
-        let faults = self.show.bus().take_faults();
+        let faults = self.demo.bus().take_faults();
         if let Some(fault) = faults.first() {
             let count = faults.len();
             bail!("the emulated card finds {count} accesses at fault, the first: {fault}");
@@ -151,7 +151,7 @@ impl Card for Emulated<'_> {
         let motion = words("motion")?.map(|parts| {
             Motion::parse(parts.split(' ')).with_context(|| format!("'{parts}' is no motion"))
         });
-        let vga = self.show.bus();
+        let vga = self.demo.bus();
         let page = vga.page().map_err(|fault| anyhow!("{fault}"))?;
         let pixels = match content {
             Content::Page => page.pixels,
@@ -177,7 +177,7 @@ impl Card for Emulated<'_> {
     }
 
     fn screen(&mut self) -> anyhow::Result<Screen> {
-        let vga = self.show.bus();
+        let vga = self.demo.bus();
         let frame = vga.scan_out().map_err(|fault| anyhow!("{fault}"))?;
         let wide = |colour: [u8; 3]| colour.map(widen);
         Ok(Screen {
@@ -224,7 +224,7 @@ mod tests {
         };
         let error = card.show(&[far]).unwrap_err().to_string();
         assert!(
-            error.ends_with("is refused: a distance is 0 to 00800000"),
+            error.ends_with("is out of range; use 0 to 00800000"),
             "{error}"
         );
         assert!(card.ask(Command::Leave).is_err());

@@ -17,14 +17,14 @@ use scene::font;
 use scene::motion::Motion;
 use texmap::{Mapper, Order};
 
+use crate::KEYS;
 use crate::palette::nearest;
-use crate::split::{self, Split};
-use crate::{KEYS, lower_mark};
+use crate::split::{self, SplitView};
 
 /// Ticks between two updates of the figures.
-const RENEWAL: u32 = 30;
+const UPDATE_TICKS: u32 = 30;
 /// Ticks that a hint stays on the screen.
-const HINT: u32 = 300;
+const HINT_TICKS: u32 = 300;
 /// Columns from one letter to the next.
 const ADVANCE: usize = font::WIDTH + 1;
 /// Lines from one line of letters to the next.
@@ -43,9 +43,9 @@ pub(crate) enum Ink {
 
 /// A set of pixels of a screen column, one bit each, from the top down.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Column([u64; HEIGHT.div_ceil(64)]);
+struct ColumnMask([u64; HEIGHT.div_ceil(64)]);
 
-impl Column {
+impl ColumnMask {
     const EMPTY: Self = Self([0; HEIGHT.div_ceil(64)]);
 
     fn set(&mut self, y: usize) {
@@ -56,12 +56,12 @@ impl Column {
         self.0[y / 64] >> (y % 64) & 1 == 1
     }
 
-    fn or(self, other: Self) -> Self {
+    fn union(self, other: Self) -> Self {
         Self(array::from_fn(|i| self.0[i] | other.0[i]))
     }
 
     /// Returns the set extended by the pixels directly above and below each of its pixels.
-    fn spread(self) -> Self {
+    fn dilate(self) -> Self {
         let word = |i: usize| self.0.get(i).copied().unwrap_or(0);
         Self(array::from_fn(|i| {
             let down = word(i) << 1 | word(i.wrapping_sub(1)) >> 63;
@@ -89,7 +89,7 @@ impl Column {
     }
 
     /// Returns each span of pixels in the set: its first y, and the y after its last.
-    fn runs(self) -> impl Iterator<Item = (usize, usize)> {
+    fn spans(self) -> impl Iterator<Item = (usize, usize)> {
         let mut y = 0;
         core::iter::from_fn(move || {
             let top = self.next(y, true);
@@ -101,24 +101,24 @@ impl Column {
 
 /// Text on the screen, one bit a pixel. About 20 KiB, all zeros when empty.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Writing {
-    plain: [Column; WIDTH],
-    bright: [Column; WIDTH],
+pub(crate) struct TextLayer {
+    plain: [ColumnMask; WIDTH],
+    bright: [ColumnMask; WIDTH],
 }
 
-impl Writing {
-    /// Returns an empty screen.
+impl TextLayer {
+    /// Returns a layer without text.
     pub const fn new() -> Self {
         Self {
-            plain: [Column::EMPTY; WIDTH],
-            bright: [Column::EMPTY; WIDTH],
+            plain: [ColumnMask::EMPTY; WIDTH],
+            bright: [ColumnMask::EMPTY; WIDTH],
         }
     }
 
     /// Erases all text.
-    pub fn wipe(&mut self) {
-        self.plain = [Column::EMPTY; WIDTH];
-        self.bright = [Column::EMPTY; WIDTH];
+    pub fn clear(&mut self) {
+        self.plain = [ColumnMask::EMPTY; WIDTH];
+        self.bright = [ColumnMask::EMPTY; WIDTH];
     }
 
     /// Writes a line with its top left corner at (x, y), and returns the x after its last letter. Pixels that
@@ -140,14 +140,14 @@ impl Writing {
     /// Draws the text with its outline.
     pub fn draw(&self, inks: &Inks, destination: &mut impl Destination) {
         let at = |x: usize| match (self.plain.get(x), self.bright.get(x)) {
-            (Some(plain), Some(bright)) => plain.or(*bright),
-            _ => Column::EMPTY,
+            (Some(plain), Some(bright)) => plain.union(*bright),
+            _ => ColumnMask::EMPTY,
         };
         for plane in 0..4 {
             destination.select(plane as u16);
             for x in (plane..WIDTH).step_by(4) {
-                let around = at(x.wrapping_sub(1)).or(at(x)).or(at(x + 1)).spread();
-                for (top, end) in around.runs() {
+                let around = at(x.wrapping_sub(1)).union(at(x)).union(at(x + 1)).dilate();
+                for (top, end) in around.spans() {
                     let mut y = top;
                     destination.lane::<{ modex::STRIDE }>(
                         x as u16,
@@ -173,7 +173,7 @@ impl Writing {
 
 /// The position of the next letter.
 struct Pen<'a> {
-    columns: &'a mut [Column; WIDTH],
+    columns: &'a mut [ColumnMask; WIDTH],
     x: usize,
     y: usize,
 }
@@ -205,7 +205,7 @@ pub(crate) struct Inks {
 
 impl Inks {
     /// Returns the entries of a palette that are nearest to white, yellow and black.
-    pub fn of(palette: &Palette) -> Self {
+    pub fn new(palette: &Palette) -> Self {
         Self {
             plain: nearest(palette, [63, 63, 63]),
             bright: nearest(palette, [63, 58, 24]),
@@ -214,62 +214,70 @@ impl Inks {
     }
 }
 
-/// The figures that the overlay shows.
+/// The figures of a frame that the overlay shows.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Figures {
+pub(crate) struct FrameStatistics {
     pub scene: &'static str,
     pub mapper: Mapper,
     pub order: Order,
     pub paused: bool,
     /// Faces of the last frame in reduced quality; `None` if reduced quality is off.
-    pub lowered: Option<u32>,
+    pub reduced_faces: Option<u32>,
     /// Pixels of the last frame.
     pub pixels: u32,
     /// Writes to Map Mask for the last frame, without its overlay.
     pub map_masks: u64,
     /// The largest error of the last frame if it was a split view, in 2^-16 texel.
-    pub most: u32,
+    pub largest_error: u32,
 }
 
-/// Frames since a tick, and the microseconds that they needed.
+/// A measuring interval: the frames since a tick, and the microseconds that they needed.
 #[derive(Clone, Copy, Debug, Default)]
-struct Window {
+struct Interval {
     since: u32,
     frames: u32,
     micros: u64,
 }
 
+/// How fast frames were drawn in the last complete interval.
+#[derive(Clone, Copy, Debug)]
+struct Rate {
+    /// Tenths of a frame a second.
+    tenths: u32,
+    /// Microseconds a frame.
+    micros: u32,
+}
+
 /// What is drawn over the frames, and its timing.
 #[derive(Debug)]
 pub(crate) struct Overlay<'a> {
-    writing: &'a mut Writing,
+    layer: &'a mut TextLayer,
     inks: Inks,
     help: bool,
     info: bool,
     split: bool,
-    colours: Split,
+    split_view: SplitView,
     hint: Option<u32>,
     /// The overlay text changed and must be redrawn.
     stale: bool,
-    window: Window,
-    /// Figures of the last complete window: tenths of a frame a second, and microseconds a frame.
-    pace: Option<(u32, u32)>,
+    interval: Interval,
+    rate: Option<Rate>,
 }
 
 impl<'a> Overlay<'a> {
     /// Returns an empty overlay that uses the colours of `palette`.
-    pub fn new(writing: &'a mut Writing, palette: &Palette) -> Self {
+    pub fn new(layer: &'a mut TextLayer, palette: &Palette) -> Self {
         Self {
-            writing,
-            inks: Inks::of(palette),
+            layer,
+            inks: Inks::new(palette),
             help: false,
             info: false,
             split: false,
-            colours: Split::of(palette),
+            split_view: SplitView::new(palette),
             hint: None,
             stale: true,
-            window: Window::default(),
-            pace: None,
+            interval: Interval::default(),
+            rate: None,
         }
     }
 
@@ -280,19 +288,19 @@ impl<'a> Overlay<'a> {
     }
 
     /// Marks the text as outdated, because the demo's state has changed.
-    pub fn renew(&mut self) {
+    pub fn invalidate(&mut self) {
         self.stale = true;
     }
 
     /// Changes the palette.
     pub fn set_palette(&mut self, palette: &Palette) {
-        self.inks = Inks::of(palette);
-        self.colours = Split::of(palette);
+        self.inks = Inks::new(palette);
+        self.split_view = SplitView::new(palette);
     }
 
     /// Returns how to draw the split view, if it is on.
-    pub fn split(&self) -> Option<&Split> {
-        Some(&self.colours).filter(|_| self.split)
+    pub fn split(&self) -> Option<&SplitView> {
+        Some(&self.split_view).filter(|_| self.split)
     }
 
     /// Handles an action of the overlay; ignores all other actions.
@@ -308,8 +316,8 @@ impl<'a> Overlay<'a> {
     }
 
     /// Adds the microseconds that drawing a frame needed.
-    pub fn took(&mut self, micros: u32) {
-        self.window.micros += u64::from(micros);
+    pub fn add_frame_time(&mut self, micros: u32) {
+        self.interval.micros += u64::from(micros);
     }
 
     /// Prepares the overlay for the frame of `tick`. Returns whether the overlay shows anything. `motion` is
@@ -317,33 +325,36 @@ impl<'a> Overlay<'a> {
     pub fn prepare(
         &mut self,
         tick: u32,
-        figures: &Figures,
+        figures: &FrameStatistics,
         motion: impl FnOnce() -> Option<Motion>,
     ) -> bool {
-        let ticks = tick.wrapping_sub(self.window.since);
-        if ticks >= RENEWAL {
-            let Window { frames, micros, .. } = self.window;
-            // No pace after a long gap: the demo may just have begun.
-            if frames > 0 && ticks < 100 * RENEWAL {
+        let ticks = tick.wrapping_sub(self.interval.since);
+        if ticks >= UPDATE_TICKS {
+            let Interval { frames, micros, .. } = self.interval;
+            // No rate after a long gap: the demo may just have begun.
+            if frames > 0 && ticks < 100 * UPDATE_TICKS {
                 let tenths = frames * 10 * TICKS_PER_SECOND / ticks;
-                self.pace = Some((tenths, (micros / u64::from(frames)) as u32));
+                self.rate = Some(Rate {
+                    tenths,
+                    micros: (micros / u64::from(frames)) as u32,
+                });
             }
-            self.window = Window {
+            self.interval = Interval {
                 since: tick,
-                ..Window::default()
+                ..Interval::default()
             };
             self.stale |= self.info || self.split;
         }
-        self.window.frames += 1;
+        self.interval.frames += 1;
         if self
             .hint
-            .is_some_and(|since| tick.wrapping_sub(since) >= HINT)
+            .is_some_and(|since| tick.wrapping_sub(since) >= HINT_TICKS)
         {
             self.hint = None;
             self.stale = true;
         }
         if core::mem::take(&mut self.stale) {
-            self.writing.wipe();
+            self.layer.clear();
             if self.help {
                 self.write_help();
             } else {
@@ -357,7 +368,7 @@ impl<'a> Overlay<'a> {
                     let text = "H: help";
                     let x = (WIDTH - text.len() * ADVANCE) / 2;
                     let y = HEIGHT - MARGIN - font::HEIGHT;
-                    self.writing.write(Ink::Plain, x, y, format_args!("{text}"));
+                    self.layer.write(Ink::Plain, x, y, format_args!("{text}"));
                 }
             }
         }
@@ -369,66 +380,62 @@ impl<'a> Overlay<'a> {
         if let Some(split) = self.split() {
             split.draw_frame(destination);
         }
-        self.writing.draw(&self.inks, destination);
+        self.layer.draw(&self.inks, destination);
     }
 
     fn write_help(&mut self) {
-        let about = MARGIN + 6 * ADVANCE;
+        let description = MARGIN + 6 * ADVANCE;
         for (i, key) in KEYS.iter().enumerate() {
             let y = MARGIN + i * LINE;
-            self.writing
+            self.layer
                 .write(Ink::Bright, MARGIN, y, format_args!("{}", key.name));
-            self.writing
-                .write(Ink::Plain, about, y, format_args!("{}", key.about));
+            self.layer
+                .write(Ink::Plain, description, y, format_args!("{}", key.about));
         }
     }
 
-    fn write_labels(&mut self, figures: &Figures) {
-        let Figures {
-            mapper,
-            most,
-            lowered,
-            ..
-        } = figures;
-        let mark = lower_mark(lowered.unwrap_or(0));
+    fn write_labels(&mut self, figures: &FrameStatistics) {
         let mut write = |ink, x, y, text: fmt::Arguments<'_>| {
-            self.writing.write(ink, x, y, text);
+            self.layer.write(ink, x, y, text);
         };
         let y = HEIGHT - MARGIN - font::HEIGHT;
-        let [left, middle, right] = split::WINDOWS.map(|x| x + MARGIN);
-        write(Ink::Bright, left, y, format_args!("{mapper}{mark}"));
+        let [left, middle, right] = split::PANELS.map(|x| x + MARGIN);
+        if figures.reduced_faces.is_some_and(|faces| faces > 0) {
+            write(Ink::Plain, left, y - LINE, format_args!("reduced quality"));
+        }
+        write(Ink::Bright, left, y, format_args!("{}", figures.mapper));
         write(Ink::Bright, middle, y, format_args!("exact"));
-        let most = Hundredths(*most);
-        write(Ink::Bright, right, y, format_args!("most {most} texel"));
+        let largest = Hundredths(figures.largest_error);
+        write(Ink::Bright, right, y, format_args!("max {largest} texel"));
         let y = split::LEGEND_Y + split::LEGEND_LINES + 3;
-        for (step, text) in [(1, "1/256"), (split::TEXEL, "1"), (split::STEPS - 1, "64")] {
+        for (step, label) in [(1, "1/256"), (split::TEXEL, "1"), (split::STEPS - 1, "64")] {
             let begins = split::LEGEND_X + step * split::LEGEND_STEP;
             // A two-letter label ends where its step ends.
-            let x = begins - ADVANCE * usize::from(text.len() == 2);
-            write(Ink::Plain, x, y, format_args!("{text}"));
+            let x = begins - ADVANCE * usize::from(label.len() == 2);
+            write(Ink::Plain, x, y, format_args!("{label}"));
         }
     }
 
-    fn write_info(&mut self, figures: &Figures, motion: Option<Motion>) {
-        let Figures {
+    fn write_info(&mut self, figures: &FrameStatistics, motion: Option<Motion>) {
+        let FrameStatistics {
             scene,
             mapper,
             order,
             paused,
             pixels,
             map_masks,
-            lowered,
+            reduced_faces,
             ..
         } = figures;
-        let (pace, writing) = (self.pace, &mut *self.writing);
+        let (rate, layer) = (self.rate, &mut *self.layer);
         let mut y = MARGIN;
         let mut line = |ink, text: fmt::Arguments<'_>| {
-            writing.write(ink, MARGIN, y, text);
+            layer.write(ink, MARGIN, y, text);
             y += LINE;
         };
         line(Ink::Bright, format_args!("{scene}"));
         line(Ink::Bright, format_args!("{mapper}  {order}"));
-        if let Some((tenths, micros)) = pace {
+        if let Some(Rate { tenths, micros }) = rate {
             line(
                 Ink::Plain,
                 format_args!(
@@ -441,30 +448,33 @@ impl<'a> Overlay<'a> {
             );
         }
         line(Ink::Plain, format_args!("{pixels} pixels"));
-        line(Ink::Plain, format_args!("{map_masks} Map Masks"));
+        line(Ink::Plain, format_args!("{map_masks} Map Mask writes"));
         if let Mapper::Within(tolerance) = mapper {
-            line(Ink::Plain, format_args!("at most {tolerance} texel off"));
+            line(Ink::Plain, format_args!("error up to {tolerance} texel"));
         }
-        if let Some((pixels, sweet_spot)) = moved(motion, pace) {
+        if let Some((pixels, sweet_spot)) = moved(motion, rate) {
             line(
                 Ink::Plain,
                 format_args!("{} pixels a frame", Hundredths(pixels)),
             );
-            if let Some((least, most)) = sweet_spot {
+            if let Some((slowest, fastest)) = sweet_spot {
                 let (ink, verdict) = match pixels {
                     // Frames are so far apart that any motion too fast to crawl is already more than half a
                     // period.
-                    _ if least > most => (Ink::Plain, ": too few frames"),
+                    _ if slowest > fastest => (Ink::Plain, ": too few frames"),
                     0 => (Ink::Plain, ""),
-                    _ if pixels < least => (Ink::Plain, ": too slow"),
-                    _ if pixels > most => (Ink::Plain, ": too fast"),
+                    _ if pixels < slowest => (Ink::Plain, ": too slow"),
+                    _ if pixels > fastest => (Ink::Plain, ": too fast"),
                     _ => (Ink::Bright, ""),
                 };
-                let (least, most) = (Hundredths(least), Hundredths(most));
-                line(ink, format_args!("sweet spot {least} to {most}{verdict}"));
+                let (slowest, fastest) = (Hundredths(slowest), Hundredths(fastest));
+                line(
+                    ink,
+                    format_args!("sweet spot {slowest} to {fastest}{verdict}"),
+                );
             }
         }
-        match lowered {
+        match reduced_faces {
             Some(faces) if mapper.lower().is_some() => {
                 line(
                     Ink::Plain,
@@ -472,7 +482,7 @@ impl<'a> Overlay<'a> {
                 );
             }
             // Without this line the key would seem to have no effect.
-            Some(_) => line(Ink::Plain, format_args!("nothing cheaper than {mapper}")),
+            Some(_) => line(Ink::Plain, format_args!("{mapper} has no reduced quality")),
             None => {}
         }
         if *paused {
@@ -483,8 +493,8 @@ impl<'a> Overlay<'a> {
 
 /// Returns how far the visible texture moves from one frame to the next, and the range in which the eye sees
 /// that as motion (the sweet spot), in 2^-16 pixel. `None` if the frame rate is unknown.
-fn moved(motion: Option<Motion>, pace: Option<(u32, u32)>) -> Option<(u32, Option<(u32, u32)>)> {
-    let (motion, (tenths, _)) = motion.zip(pace)?;
+fn moved(motion: Option<Motion>, rate: Option<Rate>) -> Option<(u32, Option<(u32, u32)>)> {
+    let (motion, Rate { tenths, .. }) = motion.zip(rate)?;
     // Ticks a frame, 16.16.
     let ticks = ((10 * TICKS_PER_SECOND) << 16).checked_div(tenths)?;
     let pixels = (u64::from(motion.pixels) * u64::from(ticks)) >> 16;
@@ -522,17 +532,18 @@ mod tests {
     /// are untouched.
     #[test]
     fn letters_have_an_outline_and_touch_nothing_else() {
-        let mut writing = Box::new(Writing::new());
+        let mut layer = Box::new(TextLayer::new());
         for (x, y) in [(4, 4), (61, 60), (318, 232), (200, 239), (0, 0)] {
-            writing.write(Ink::Plain, x, y, format_args!("K%"));
-            writing.write(Ink::Bright, x, y.wrapping_add(9), format_args!("Z"));
+            layer.write(Ink::Plain, x, y, format_args!("K%"));
+            layer.write(Ink::Bright, x, y.wrapping_add(9), format_args!("Z"));
         }
         let mut page = Box::new(PlanarBuffer::new());
-        writing.draw(&INKS, &mut *page);
+        layer.draw(&INKS, &mut *page);
         let ink = |x: usize, y: usize| {
-            let of =
-                |columns: &[Column; WIDTH]| columns.get(x).is_some_and(|c| y < HEIGHT && c.has(y));
-            [of(&writing.plain), of(&writing.bright)]
+            let of = |columns: &[ColumnMask; WIDTH]| {
+                columns.get(x).is_some_and(|c| y < HEIGHT && c.has(y))
+            };
+            [of(&layer.plain), of(&layer.bright)]
         };
         let mut count = [0; 4];
         for y in 0..HEIGHT {
@@ -554,13 +565,12 @@ mod tests {
     }
 
     #[test]
-    fn everything_that_is_written_has_letters() {
+    fn every_character_of_the_overlay_has_a_glyph() {
         let mut written = String::new();
         for key in KEYS {
             written += key.name;
             written += key.about;
         }
-        written += lower_mark(1);
         written.extend(CATALOGUE.iter().map(|entry| entry.name));
         written.extend(Mapper::ALL.iter().map(|(name, ..)| *name));
         written.extend(Order::ALL.iter().map(|(name, ..)| *name));
@@ -574,8 +584,8 @@ mod tests {
 
     /// Reads the text from (x, y) on, up to a gap of three letters, with its ink. The text is in capitals,
     /// because small letters look the same.
-    fn read(writing: &Writing, x: usize, y: usize) -> Option<(Ink, String)> {
-        let letter = |columns: &[Column; WIDTH], x: usize| {
+    fn read(layer: &TextLayer, x: usize, y: usize) -> Option<(Ink, String)> {
+        let letter = |columns: &[ColumnMask; WIDTH], x: usize| {
             let has = |row: usize, column: usize| columns[x + column].has(y + row);
             let glyph: font::Glyph = array::from_fn(|row| {
                 let columns = (0..font::WIDTH).filter(|&column| has(row, column));
@@ -583,7 +593,7 @@ mod tests {
             });
             (' '..='~').find(|&known| font::glyph(known) == glyph)
         };
-        let inks = [(Ink::Plain, &writing.plain), (Ink::Bright, &writing.bright)];
+        let inks = [(Ink::Plain, &layer.plain), (Ink::Bright, &layer.bright)];
         inks.into_iter().find_map(|(ink, columns)| {
             let letters = (x..WIDTH - ADVANCE).step_by(ADVANCE);
             let text: String = letters.map(|x| letter(columns, x).unwrap_or('?')).collect();
@@ -597,18 +607,18 @@ mod tests {
     fn lines(overlay: &Overlay<'_>) -> Vec<(Ink, String)> {
         let lines = (MARGIN..HEIGHT - LINE).step_by(LINE);
         lines
-            .map_while(|y| read(overlay.writing, MARGIN, y))
+            .map_while(|y| read(overlay.layer, MARGIN, y))
             .collect()
     }
 
-    const FIGURES: Figures = Figures {
+    const FIGURES: FrameStatistics = FrameStatistics {
         scene: "ball",
         mapper: Mapper::Exact,
         order: Order::Planes,
         paused: false,
-        lowered: None,
+        reduced_faces: None,
         pixels: 12_345,
-        most: 0,
+        largest_error: 0,
         map_masks: 678,
     };
 
@@ -618,18 +628,18 @@ mod tests {
         part: 1 << 14,
     };
 
-    fn overlay(writing: &mut Writing) -> Overlay<'_> {
-        Overlay::new(writing, CATALOGUE[0].scene(&[]).palette)
+    fn overlay(layer: &mut TextLayer) -> Overlay<'_> {
+        Overlay::new(layer, CATALOGUE[0].scene(&[]).palette)
     }
 
     /// Returns the lines of `info` after a second of frames, `every` ticks apart.
-    fn info(every: u32, figures: &Figures, motion: Option<Motion>) -> Vec<(Ink, String)> {
-        let mut writing = Box::new(Writing::new());
-        let mut overlay = overlay(&mut writing);
+    fn info(every: u32, figures: &FrameStatistics, motion: Option<Motion>) -> Vec<(Ink, String)> {
+        let mut layer = Box::new(TextLayer::new());
+        let mut overlay = overlay(&mut layer);
         overlay.act(0, Action::Info);
         for tick in (0..=60).step_by(every as usize) {
             assert!(overlay.prepare(tick, figures, || motion));
-            overlay.took(2_567);
+            overlay.add_frame_time(2_567);
         }
         lines(&overlay)
     }
@@ -643,13 +653,13 @@ mod tests {
     }
 
     #[test]
-    fn info_tells_pace_work_and_motion() {
+    fn info_shows_rate_work_and_motion() {
         let figures = [
             bright("ball"),
             bright("exact  planes"),
             plain("60.0 frames/s  2.56 ms"),
             plain("12345 pixels"),
-            plain("678 Map Masks"),
+            plain("678 Map Mask writes"),
         ];
         assert_eq!(info(1, &FIGURES, None), figures);
         let moves = [
@@ -669,52 +679,52 @@ mod tests {
 
     #[test]
     fn info_says_whether_the_motion_is_in_the_sweet_spot() {
-        let says = |every, pixels, part| {
+        let verdict = |every, pixels, part| {
             let motion = Some(Motion { pixels, part });
             info(every, &FIGURES, motion)[5..].to_vec()
         };
         assert_eq!(
-            says(1, 6_560, 1 << 14)[1],
+            verdict(1, 6_560, 1 << 14)[1],
             plain("sweet spot 0.19 to 0.40: too slow")
         );
         assert_eq!(
-            says(1, 3 << 15, 1 << 17)[1],
+            verdict(1, 3 << 15, 1 << 17)[1],
             plain("sweet spot 0.19 to 0.75: too fast")
         );
         assert_eq!(
-            says(10, 3 << 15, 3 << 16)[1],
+            verdict(10, 3 << 15, 3 << 16)[1],
             plain("sweet spot 2.00 to 0.50: too few frames")
         );
         // Nothing moves in the texture.
-        assert_eq!(says(1, 3 << 15, 0), [plain("1.50 pixels a frame")]);
+        assert_eq!(verdict(1, 3 << 15, 0), [plain("1.50 pixels a frame")]);
     }
 
     #[test]
-    fn info_tells_reduced_quality_tolerance_and_pause() {
-        let last = |figures: Figures| info(1, &figures, None)[5..].to_vec();
-        let lowered = |mapper, faces| Figures {
+    fn info_shows_reduced_quality_tolerance_and_pause() {
+        let last = |figures: FrameStatistics| info(1, &figures, None)[5..].to_vec();
+        let reduced = |mapper, faces| FrameStatistics {
             mapper,
-            lowered: Some(faces),
+            reduced_faces: Some(faces),
             ..FIGURES
         };
         assert_eq!(
-            last(lowered(Mapper::Exact, 3)),
+            last(reduced(Mapper::Exact, 3)),
             [plain("faces in reduced quality: 3")]
         );
         let affine = Mapper::default();
         assert_eq!(
-            last(lowered(affine, 0)),
-            [plain("nothing cheaper than shifts")]
+            last(reduced(affine, 0)),
+            [plain("shifts has no reduced quality")]
         );
         let within = Mapper::parse("within-1/4").unwrap();
-        let paused = Figures {
+        let paused = FrameStatistics {
             paused: true,
-            ..lowered(within, 0)
+            ..reduced(within, 0)
         };
         assert_eq!(
             last(paused),
             [
-                plain("at most 1/4 texel off"),
+                plain("error up to 1/4 texel"),
                 plain("faces in reduced quality: 0"),
                 bright("paused")
             ]
@@ -723,12 +733,12 @@ mod tests {
 
     /// The figures change twice a second, because figures that changed with every frame would be illegible.
     #[test]
-    fn info_changes_twice_a_second_and_knows_no_pace_over_a_gap() {
-        let mut writing = Box::new(Writing::new());
-        let mut overlay = overlay(&mut writing);
+    fn info_changes_twice_a_second_and_has_no_rate_after_a_gap() {
+        let mut layer = Box::new(TextLayer::new());
+        let mut overlay = overlay(&mut layer);
         overlay.act(0, Action::Info);
         let mut pixels = |tick, pixels| {
-            let figures = Figures { pixels, ..FIGURES };
+            let figures = FrameStatistics { pixels, ..FIGURES };
             overlay.prepare(tick, &figures, || None);
             lines(&overlay)
         };
@@ -739,7 +749,7 @@ mod tests {
             [plain("4.0 frames/s  0.00 ms"), plain("3 pixels")]
         );
         assert_eq!(pixels(59, 4)[3], plain("3 pixels"));
-        // A gap of 50 seconds or more gives no pace.
+        // A gap of 50 seconds or more gives no rate.
         assert_eq!(pixels(30 + 2999, 5)[2], plain("0.0 frames/s  0.00 ms"));
         assert_eq!(
             pixels(30 + 2999 + 3000, 6)[2..4],
@@ -749,19 +759,18 @@ mod tests {
 
     #[test]
     fn help_has_a_line_for_each_key() {
-        let mut writing = Box::new(Writing::new());
-        let mut overlay = overlay(&mut writing);
+        let mut layer = Box::new(TextLayer::new());
+        let mut overlay = overlay(&mut layer);
         overlay.act(0, Action::Help);
         assert!(overlay.prepare(0, &FIGURES, || None));
         for (i, key) in KEYS.iter().enumerate() {
             let y = MARGIN + i * LINE;
-            let about = read(overlay.writing, MARGIN + 6 * ADVANCE, y);
+            let about = read(overlay.layer, MARGIN + 6 * ADVANCE, y);
             assert_eq!(about, Some(plain(key.about)));
             let mut name = String::new();
             let letters = (MARGIN..).step_by(ADVANCE).take(key.name.len());
             for (x, letter) in letters.zip(key.name.chars()) {
-                let has =
-                    |row: usize, column: usize| overlay.writing.bright[x + column].has(y + row);
+                let has = |row: usize, column: usize| overlay.layer.bright[x + column].has(y + row);
                 let drawn = font::glyph(letter)
                     .into_iter()
                     .enumerate()
@@ -778,39 +787,41 @@ mod tests {
     }
 
     #[test]
-    fn a_split_view_names_its_parts_and_a_hint_stays_five_seconds() {
-        let mut writing = Box::new(Writing::new());
-        let mut overlay = overlay(&mut writing);
+    fn a_split_view_has_labels_and_a_hint_stays_five_seconds() {
+        let mut layer = Box::new(TextLayer::new());
+        let mut overlay = overlay(&mut layer);
         let bottom = HEIGHT - MARGIN - font::HEIGHT;
         overlay.act(7, Action::Hint);
         for (tick, hint) in [(7, true), (306, true), (307, false), (308, false)] {
             assert_eq!(overlay.prepare(tick, &FIGURES, || None), hint, "{tick}");
             let x = (WIDTH - 7 * ADVANCE) / 2;
-            let written = read(overlay.writing, x, bottom);
+            let written = read(overlay.layer, x, bottom);
             assert_eq!(written, hint.then(|| plain("H: help")), "{tick}");
         }
         overlay.act(400, Action::Split);
-        let figures = Figures {
-            most: 3 << 15,
-            lowered: Some(1),
+        let figures = FrameStatistics {
+            largest_error: 3 << 15,
+            reduced_faces: Some(1),
             ..FIGURES
         };
         assert!(overlay.prepare(400, &figures, || None));
-        let texts = split::WINDOWS.map(|x| read(overlay.writing, x + MARGIN, bottom).unwrap().1);
-        assert_eq!(texts, ["EXACT~", "EXACT", "MOST 1.50 TEXEL"]);
+        let texts = split::PANELS.map(|x| read(overlay.layer, x + MARGIN, bottom).unwrap().1);
+        assert_eq!(texts, ["EXACT", "EXACT", "MAX 1.50 TEXEL"]);
+        let above = read(overlay.layer, split::PANELS[0] + MARGIN, bottom - LINE);
+        assert_eq!(above, Some(plain("reduced quality")));
         let y = split::LEGEND_Y + split::LEGEND_LINES + 3;
         let step = |step: usize| split::LEGEND_X + step * split::LEGEND_STEP;
-        let first = read(overlay.writing, step(1), y).unwrap().1;
+        let first = read(overlay.layer, step(1), y).unwrap().1;
         assert!(first.starts_with("1/256"), "{first}");
-        let last = read(overlay.writing, step(split::STEPS - 1) - ADVANCE, y);
+        let last = read(overlay.layer, step(split::STEPS - 1) - ADVANCE, y);
         assert_eq!(last, Some(plain("64")));
-        let one = read(overlay.writing, step(split::TEXEL), y).unwrap().1;
+        let one = read(overlay.layer, step(split::TEXEL), y).unwrap().1;
         assert!(one.starts_with('1'), "{one}");
     }
 
     #[test]
-    fn a_palette_has_its_nearest_to_white_yellow_and_black() {
-        let inks = Inks::of(CATALOGUE[0].scene(&[]).palette);
+    fn inks_are_the_colours_nearest_to_white_yellow_and_black() {
+        let inks = Inks::new(CATALOGUE[0].scene(&[]).palette);
         assert_eq!(
             inks,
             Inks {
@@ -822,7 +833,7 @@ mod tests {
         let mut palette = [[30; 3]; 256];
         (palette[7], palette[255], palette[9]) = ([60, 61, 62], [3, 0, 0], [50, 50, 0]);
         assert_eq!(
-            Inks::of(&palette),
+            Inks::new(&palette),
             Inks {
                 plain: 7,
                 bright: 9,

@@ -1,6 +1,6 @@
 //! The split view: one frame three times, drawn by the current mapper, drawn exactly, and as its error.
 //!
-//! Each window shows the same 104 columns from the middle of the frame. The windows are multiples of four
+//! Each panel shows the same 104 columns from the middle of the frame. The panels are multiples of four
 //! columns away from those columns, so each column of the frame keeps its plane, and no mapper has to know
 //! about the split view.
 //!
@@ -15,13 +15,13 @@ use texmap::{Mapper, Stats};
 
 use crate::palette::nearest;
 
-/// The columns of the frame that each window shows.
+/// The columns of the frame that each panel shows.
 const COLUMNS: Range<u16> = 108..212;
-/// First column of each window.
-pub(crate) const WINDOWS: [usize; 3] = [0, 108, 216];
-/// Columns in a window.
-const WINDOW: usize = COLUMNS.end as usize - COLUMNS.start as usize;
-const _: () = assert!(WINDOWS[2] + WINDOW == WIDTH);
+/// First column of each panel.
+pub(crate) const PANELS: [usize; 3] = [0, 108, 216];
+/// Columns in a panel.
+const PANEL: usize = COLUMNS.end as usize - COLUMNS.start as usize;
+const _: () = assert!(PANELS[2] + PANEL == WIDTH);
 
 /// Steps of the heat map: the first is below 1/256 texel, each further step begins where the error has
 /// doubled, and the last is 64 texels and more.
@@ -34,7 +34,7 @@ const FIRST: u32 = 8;
 /// Columns of a step in the legend. The constants after it are the legend's lines, left border and top.
 pub(crate) const LEGEND_STEP: usize = 6;
 pub(crate) const LEGEND_LINES: usize = 5;
-pub(crate) const LEGEND_X: usize = WINDOWS[2] + (WINDOW - STEPS * LEGEND_STEP) / 2;
+pub(crate) const LEGEND_X: usize = PANELS[2] + (PANEL - STEPS * LEGEND_STEP) / 2;
 pub(crate) const LEGEND_Y: usize = HEIGHT - 29;
 
 /// The heat map's colours. In a palette that contains them, the steps are distinct.
@@ -54,21 +54,21 @@ fn step(error: u32) -> usize {
 
 /// The palette entries of the heat map.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Split {
+pub(crate) struct SplitView {
     heat: [u8; STEPS],
     black: u8,
 }
 
-impl Split {
+impl SplitView {
     /// Returns the entries of a palette that are nearest to the heat map's colours.
-    pub fn of(palette: &Palette) -> Self {
+    pub fn new(palette: &Palette) -> Self {
         Self {
             heat: HEAT.map(|colour| nearest(palette, colour)),
             black: nearest(palette, [0; 3]),
         }
     }
 
-    /// Draws the three windows. Returns the counts of the first window, and the largest error in the last, in
+    /// Draws the three panels. Returns the counts of the first panel, and the largest error in the last, in
     /// 2^-16 texel.
     pub fn draw(
         &self,
@@ -76,26 +76,26 @@ impl Split {
         pose: &Pose,
         destination: &mut impl Destination,
     ) -> (Stats, u32) {
-        let [left, middle, right] = WINDOWS.map(|x| x as u16);
-        let (mapper, lower) = (stage.mapper(), stage.lower_for(None));
+        let [left, middle, right] = PANELS.map(|x| x as u16);
+        let (mapper, next) = (stage.mapper(), stage.lower_for(None));
         stage.set_mapper(Mapper::Exact);
         stage.draw(pose, &mut Window::new(destination, COLUMNS, middle));
         stage.set_mapper(mapper);
-        stage.lower_for(lower);
+        stage.lower_for(next);
         let colour = |error| self.heat[step(error)];
-        let mut window = Window::new(destination, COLUMNS, right);
-        let most = stage.draw_errors(pose, COLUMNS, colour, &mut window);
+        let mut panel = Window::new(destination, COLUMNS, right);
+        let largest_error = stage.draw_errors(pose, COLUMNS, colour, &mut panel);
         let stats = stage.draw(pose, &mut Window::new(destination, COLUMNS, left));
-        (stats, most)
+        (stats, largest_error)
     }
 
-    /// Draws the bars between the windows, and the heat map's legend.
+    /// Draws the bars between the panels, and the heat map's legend.
     pub fn draw_frame(&self, destination: &mut impl Destination) {
         let (left, top) = (LEGEND_X, LEGEND_Y);
         for plane in 0..4 {
             destination.select(plane as u16);
-            for window in &WINDOWS[1..] {
-                let x = window - 4 + plane;
+            for panel in &PANELS[1..] {
+                let x = panel - 4 + plane;
                 destination.lane::<{ modex::STRIDE }>(x as u16, 0, HEIGHT as u16, |column| {
                     column.fill(|| self.black);
                 });
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_step_begins_where_an_error_has_doubled() {
+    fn each_step_doubles_the_error() {
         assert_eq!([0, 1, 255].map(step), [0; 3]);
         for (i, log) in (FIRST..FIRST + 15).enumerate() {
             let error = 1 << log;
@@ -128,9 +128,9 @@ mod tests {
     }
 
     #[test]
-    fn heat_has_a_colour_for_every_step_in_the_built_in_palette() {
+    fn the_built_in_palette_has_a_different_colour_for_each_step() {
         let palette = scene::catalogue::CATALOGUE[0].scene(&[]).palette;
-        let heat = Split::of(palette).heat;
+        let heat = SplitView::new(palette).heat;
         for (i, a) in heat.iter().enumerate() {
             assert!(!heat[..i].contains(a), "step {i}");
         }

@@ -1,191 +1,22 @@
 //! Steering: the state that a running demo's frames depend on, and its changes.
 //!
 //! A frame is a function of a [`State`] and a tick, and a state changes only at ticks. So the changes and
-//! their ticks, which the [`Log`] stores, define every frame: the log gives the same frames again on any
-//! machine, however many ticks that machine skips.
-//!
-//! # Motion
-//!
-//! Each scene has its own motion: its pose at a time is [`Entry::pose`]. Steering lets that time pass faster
-//! or slower, and adds a turn about each axis and a distance. Rates are integers per tick. A change first
-//! accumulates the motion since the last change, and then becomes the new starting point. So nothing is
-//! summed tick by tick, and no error grows.
-//!
-//! Keys repeat. The legal ranges bound what a repeated key can do, so holding a key down for an hour does no
-//! more than holding it down for a minute.
+//! their ticks, which the [`Log`](crate::log::Log) stores, define every frame: the log gives the same frames
+//! again on any machine, however many ticks that machine skips.
+
+use core::fmt;
 
 use protocol::{Action, Change, Setting, Word};
 use scene::Pose;
 use scene::catalogue::{CATALOGUE, Entry};
 use texmap::{Mapper, Order, Tolerance};
 
-/// One (1.0), with 16 fraction bits.
-const ONE: u32 = 1 << 16;
-/// The rate that one push adds: 1/2880 turn a tick, a quarter of the ball's own rate.
-const PUSH: i32 = ((1u64 << 32) / 2880) as i32;
-/// Most pushes to one side: one turn in a second and a half.
-const MAX_PUSHES: i32 = 32;
+use crate::trajectory::Trajectory;
+
 /// The change of distance in one step, 16.16: 1/16 unit.
 const STEP: i32 = 1 << 12;
-/// Most gears up or down. Four gears double the speed, so the range is 1/16 to 16 times.
-const MAX_GEAR: i8 = 16;
 
-/// How the pose depends on the tick.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Motion {
-    /// The tick of the last change. The other fields describe the motion at that tick.
-    since: u32,
-    /// The scene's own time, in ticks with 16 fraction bits; 48 bits.
-    time: u64,
-    /// Whether the scene's own time passes.
-    own: bool,
-    /// The turn that steering adds to yaw, pitch and roll, in 32-bit fractions of a turn.
-    turned: [u32; 3],
-    /// Pushes on each angle, which give its rate.
-    pushes: [i32; 3],
-    /// The distance that steering adds, 16.16.
-    distance: i32,
-    /// The speed of all motion: 2^(gear / 4) times.
-    gear: i8,
-    /// Whether all motion stands still, whatever the rates are.
-    paused: bool,
-}
-
-impl Motion {
-    /// The scene's own motion, not steered.
-    const OWN: Self = Self {
-        since: 0,
-        time: 0,
-        own: true,
-        turned: [0; 3],
-        pushes: [0; 3],
-        distance: 0,
-        gear: 0,
-        paused: false,
-    };
-
-    /// Returns the speed that the gear gives, 16.16.
-    fn factor(&self) -> u32 {
-        // 2^(0/4) to 2^(3/4), rounded to nearest.
-        const QUARTERS: [u32; 4] = [ONE, 77_936, 92_682, 110_218];
-        let factor = QUARTERS[self.gear.rem_euclid(4) as usize];
-        match self.gear.div_euclid(4) {
-            octaves @ 0.. => factor << octaves,
-            octaves => factor >> -octaves,
-        }
-    }
-
-    /// Returns how much each angle turns in a tick, as a 32-bit fraction of a turn.
-    fn rates(&self) -> [i32; 3] {
-        let factor = i64::from(self.factor());
-        // 32 pushes at 16 times the speed are less than a quarter of a turn, so the rate fits.
-        self.pushes
-            .map(|pushes| ((i64::from(pushes * PUSH) * factor) >> 16) as i32)
-    }
-
-    /// Returns the same motion with `tick` as its starting point.
-    fn at(&self, tick: u32) -> Self {
-        self.after(if self.paused {
-            0
-        } else {
-            tick.wrapping_sub(self.since)
-        })
-        .starting(tick)
-    }
-
-    fn starting(self, since: u32) -> Self {
-        Self { since, ..self }
-    }
-
-    /// Returns the motion advanced by `ticks`, with its starting point unchanged.
-    fn after(&self, ticks: u32) -> Self {
-        let mut after = *self;
-        if self.own {
-            let passed = u64::from(self.factor()) * u64::from(ticks);
-            after.time = self.time.wrapping_add(passed) & ((1 << 48) - 1);
-        }
-        for (turned, rate) in after.turned.iter_mut().zip(self.rates()) {
-            *turned = turned.wrapping_add((rate as u32).wrapping_mul(ticks));
-        }
-        after
-    }
-
-    /// Returns the pose at the motion's starting point.
-    fn pose(&self, entry: &Entry<'_>) -> Pose {
-        let tick = (self.time >> 16) as u32;
-        let part = i64::from(self.time as u32 % ONE);
-        let own = entry.pose(tick);
-        self.steered(match part {
-            0 => own,
-            // Interpolate: a slowed-down scene would otherwise stand still for some ticks, and then jump.
-            _ => {
-                let next = entry.pose(tick.wrapping_add(1));
-                between(&own, &entry.following(&own, next), part)
-            }
-        })
-    }
-
-    /// Adds the steered turn and distance to the scene's own pose.
-    fn steered(&self, own: Pose) -> Pose {
-        let [yaw, pitch, roll] = self.turned;
-        Pose {
-            yaw: own.yaw.wrapping_add(yaw),
-            pitch: own.pitch.wrapping_add(pitch),
-            roll: own.roll.wrapping_add(roll),
-            distance: (own.distance + self.distance).clamp(0, Pose::MAX_DISTANCE),
-        }
-    }
-
-    /// Adds a push to one side to angle number `angle`.
-    fn push(&mut self, angle: usize, side: i32) {
-        self.pushes[angle] = (self.pushes[angle] + side).clamp(-MAX_PUSHES, MAX_PUSHES);
-    }
-
-    fn moves(&self) -> bool {
-        self.own || self.pushes != [0; 3]
-    }
-
-    fn faster(&mut self) {
-        match self.moves() {
-            true => self.gear = (self.gear + 1).min(MAX_GEAR),
-            false => self.own = true,
-        }
-    }
-
-    fn slower(&mut self) {
-        if self.moves() {
-            self.gear = (self.gear - 1).max(-MAX_GEAR);
-        }
-    }
-
-    fn stop(&mut self) {
-        (self.own, self.pushes, self.gear) = (false, [0; 3], 0);
-    }
-
-    /// Changes the distance by `step`, as far as the pose stays legal.
-    fn approach(&mut self, step: i32, entry: &Entry<'_>) {
-        let here = self.pose(entry).distance;
-        self.distance += (here + step).clamp(0, Pose::MAX_DISTANCE) - here;
-    }
-}
-
-/// Returns the pose at `part`, with 16 fraction bits, of the way between two poses. Each angle goes the
-/// shorter way.
-fn between(from: &Pose, to: &Pose, part: i64) -> Pose {
-    let angle = |a: u32, b: u32| {
-        let way = i64::from(b.wrapping_sub(a) as i32);
-        a.wrapping_add(((way * part) >> 16) as u32)
-    };
-    let way = i64::from(to.distance) - i64::from(from.distance);
-    Pose {
-        yaw: angle(from.yaw, to.yaw),
-        pitch: angle(from.pitch, to.pitch),
-        roll: angle(from.roll, to.roll),
-        distance: from.distance + ((way * part) >> 16) as i32,
-    }
-}
-
-/// The available scenes: the catalogue's, and the loaded model if one exists.
+/// The available scenes, by number: the catalogue's, then the loaded model if one exists.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scenes<'a> {
     model: Option<Entry<'a>>,
@@ -198,25 +29,81 @@ impl<'a> Scenes<'a> {
     }
 
     /// Returns all scenes, in order.
-    pub fn all(&self) -> impl Iterator<Item = Entry<'a>> + use<'a> {
-        CATALOGUE.iter().copied().chain(self.model)
+    pub fn all(&self) -> impl Iterator<Item = &Entry<'a>> {
+        CATALOGUE.iter().chain(&self.model)
     }
 
-    /// Returns the scene to begin with: the model, or the ball.
-    pub fn default(&self) -> Entry<'a> {
-        self.model.unwrap_or(CATALOGUE[0])
+    /// Returns how many scenes exist.
+    fn count(&self) -> usize {
+        CATALOGUE.len() + usize::from(self.model.is_some())
     }
 
-    /// Returns the scene with a name.
-    fn named(&self, name: &str) -> Option<Entry<'a>> {
-        self.all().find(|entry| entry.name == name)
+    /// Returns the number of the scene to begin with: the model, or the ball.
+    pub fn default(&self) -> usize {
+        match self.model {
+            Some(_) => CATALOGUE.len(),
+            None => 0,
+        }
     }
 
-    /// Returns the scene after `entry`; after the last comes the first.
-    fn after(&self, entry: &Entry<'a>) -> Entry<'a> {
-        let mut rest = self.all().skip_while(|known| known.name != entry.name);
-        rest.nth(1).unwrap_or(CATALOGUE[0])
+    /// Returns a scene by its number.
+    fn entry(&self, number: usize) -> &Entry<'a> {
+        match &self.model {
+            Some(model) if number == CATALOGUE.len() => model,
+            _ => &CATALOGUE[number],
+        }
     }
+
+    /// Resolves a change's name.
+    ///
+    /// # Errors
+    /// The name is unknown.
+    pub fn resolve(&self, change: Change) -> Result<StateChange, UnknownName> {
+        let (setting, name) = match change {
+            Change::Act(action) => return Ok(StateChange::Act(action)),
+            Change::Set(setting, name) => (setting, name),
+        };
+        let text = name.as_str();
+        let resolved = match setting {
+            Setting::Scene => {
+                let number = self.all().position(|entry| entry.name == text);
+                number.map(StateChange::Scene)
+            }
+            Setting::Mapper => Mapper::parse(text).map(StateChange::Mapper),
+            Setting::Order => Order::parse(text).map(StateChange::Order),
+        };
+        resolved.ok_or(UnknownName(setting, name))
+    }
+
+    /// Displays a change as `steer` accepts it.
+    pub fn display(&self, change: StateChange) -> impl fmt::Display {
+        fmt::from_fn(move |f| match change {
+            StateChange::Act(action) => write!(f, "{action}"),
+            StateChange::Scene(number) => {
+                write!(f, "{} {}", Setting::Scene, self.entry(number).name)
+            }
+            StateChange::Mapper(mapper) => write!(f, "{} {mapper}", Setting::Mapper),
+            StateChange::Order(order) => write!(f, "{} {order}", Setting::Order),
+        })
+    }
+}
+
+/// The error that no value of a setting has this name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct UnknownName(pub Setting, pub Word);
+
+/// A [`Change`] whose name is resolved.
+///
+/// `repr(u8)` keeps the tag in a byte before the payload, so a change to [`Action::YawLeft`] is all zeros. An
+/// empty log then occupies no space in the kernel's image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum StateChange {
+    Act(Action),
+    /// The number of a scene in [`Scenes`].
+    Scene(usize),
+    Mapper(Mapper),
+    Order(Order),
 }
 
 /// The state that a frame depends on, besides its tick.
@@ -224,106 +111,112 @@ impl<'a> Scenes<'a> {
 pub(crate) struct State<'a> {
     /// The scenes to choose from.
     pub scenes: Scenes<'a>,
-    /// The current scene.
-    pub entry: Entry<'a>,
+    /// The number of the current scene.
+    pub scene: usize,
     /// The mapper of the scene's textures.
     pub mapper: Mapper,
     /// The order in which spans are drawn.
     pub order: Order,
     /// Whether faces are drawn in reduced quality where motion hides it.
-    pub lower: bool,
-    motion: Motion,
+    pub reduced_quality: bool,
+    trajectory: Trajectory,
 }
-
-/// The error that a name is unknown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Unknown;
 
 impl<'a> State<'a> {
     /// Returns the state of a scene with its own motion and the default settings.
-    pub fn of(scenes: Scenes<'a>, entry: Entry<'a>) -> Self {
+    pub fn new(scenes: Scenes<'a>, scene: usize) -> Self {
         Self {
             scenes,
-            entry,
+            scene,
             mapper: Mapper::default(),
             order: Order::default(),
-            lower: false,
-            motion: Motion::OWN,
+            reduced_quality: false,
+            trajectory: Trajectory::UNSTEERED,
         }
     }
 
     /// Returns the same settings with the scene's own motion.
     pub fn unsteered(&self) -> Self {
         Self {
-            motion: Motion::OWN,
+            trajectory: Trajectory::UNSTEERED,
             ..*self
         }
     }
 
+    /// Returns the current scene.
+    pub fn entry(&self) -> &Entry<'a> {
+        self.scenes.entry(self.scene)
+    }
+
     /// Returns the pose at a tick. The tick is not before the last change.
     pub fn pose(&self, tick: u32) -> Pose {
-        self.motion.at(tick).pose(&self.entry)
+        self.trajectory.at(tick).pose(self.entry())
     }
 
     /// Returns the pose at the next tick, as a continuation of the pose at `tick`: without a jump where tiles
     /// repeat.
     pub fn next_pose(&self, tick: u32) -> Pose {
         let next = self.pose(tick.wrapping_add(1));
-        self.entry.following(&self.pose(tick), next)
+        self.entry().following(&self.pose(tick), next)
     }
 
     /// Returns whether all motion is paused.
     pub fn is_paused(&self) -> bool {
-        self.motion.paused
+        self.trajectory.paused
     }
 
     /// Applies a change at a tick, which is not before the last change. Returns whether the state changed.
-    ///
-    /// # Errors
-    /// The name is unknown. The state did not change.
-    pub fn change(&mut self, tick: u32, change: &Change) -> Result<bool, Unknown> {
+    pub fn apply(&mut self, tick: u32, change: StateChange) -> bool {
         let mut next = *self;
         match change {
-            Change::Act(action) => next.act(tick, *action),
-            Change::Set(setting, name) => next.set(*setting, name)?,
+            StateChange::Act(action) => next.act(tick, action),
+            StateChange::Scene(number) => next.set_scene(number),
+            StateChange::Mapper(mapper) => next.mapper = mapper,
+            StateChange::Order(order) => next.order = order,
         }
         let changed = next.differs(self, tick);
         if changed {
             *self = next;
         }
-        Ok(changed)
+        changed
     }
 
     fn differs(&self, other: &Self, tick: u32) -> bool {
-        self.entry.name != other.entry.name
-            || (self.mapper, self.order, self.lower) != (other.mapper, other.order, other.lower)
-            || self.motion.at(tick) != other.motion.at(tick)
+        let settings = |state: &Self| {
+            let Self {
+                scene,
+                mapper,
+                order,
+                reduced_quality,
+                ..
+            } = *state;
+            (scene, mapper, order, reduced_quality)
+        };
+        settings(self) != settings(other) || self.trajectory.at(tick) != other.trajectory.at(tick)
     }
 
     fn act(&mut self, tick: u32, action: Action) {
-        self.motion = self.motion.at(tick);
-        let (motion, entry) = (&mut self.motion, self.entry);
+        self.trajectory = self.trajectory.at(tick);
+        let entry = self.scenes.entry(self.scene);
+        let trajectory = &mut self.trajectory;
         match action {
             // With a positive yaw the side towards the viewer moves to the left, with a positive pitch it
             // moves down, and with a positive roll the top moves to the right.
-            Action::YawLeft => motion.push(0, 1),
-            Action::YawRight => motion.push(0, -1),
-            Action::PitchUp => motion.push(1, -1),
-            Action::PitchDown => motion.push(1, 1),
-            Action::RollLeft => motion.push(2, -1),
-            Action::RollRight => motion.push(2, 1),
-            Action::Faster => motion.faster(),
-            Action::Slower => motion.slower(),
-            Action::Stop => motion.stop(),
-            Action::Pause => motion.paused = !motion.paused,
-            Action::Step if motion.paused => *motion = motion.after(1),
-            Action::Step => motion.paused = true,
-            Action::Nearer => motion.approach(-STEP, &entry),
-            Action::Farther => motion.approach(STEP, &entry),
-            Action::NextScene => {
-                let next = self.scenes.after(&entry);
-                self.put(next);
-            }
+            Action::YawLeft => trajectory.push(0, 1),
+            Action::YawRight => trajectory.push(0, -1),
+            Action::PitchUp => trajectory.push(1, -1),
+            Action::PitchDown => trajectory.push(1, 1),
+            Action::RollLeft => trajectory.push(2, -1),
+            Action::RollRight => trajectory.push(2, 1),
+            Action::Faster => trajectory.faster(),
+            Action::Slower => trajectory.slower(),
+            Action::Stop => trajectory.stop(),
+            Action::Pause => trajectory.paused = !trajectory.paused,
+            Action::Step if trajectory.paused => *trajectory = trajectory.after(1),
+            Action::Step => trajectory.paused = true,
+            Action::Nearer => trajectory.approach(-STEP, entry),
+            Action::Farther => trajectory.approach(STEP, entry),
+            Action::NextScene => self.set_scene((self.scene + 1) % self.scenes.count()),
             Action::NextMapper => self.mapper = neighbour(self.mapper, 1),
             Action::LastMapper => self.mapper = neighbour(self.mapper, Mapper::ALL.len() - 1),
             Action::Finer => self.mapper = within(self.mapper, Tolerance::half),
@@ -335,27 +228,17 @@ impl<'a> State<'a> {
                 let next = here.map_or(0, |here| (here + 1) % Order::ALL.len());
                 self.order = Order::ALL[next].1;
             }
-            Action::Quality => self.lower = !self.lower,
-            Action::Reset => *self = Self::of(self.scenes, entry),
+            Action::Quality => self.reduced_quality = !self.reduced_quality,
+            Action::Reset => *self = Self::new(self.scenes, self.scene),
             Action::Help | Action::Info | Action::Split | Action::Hint => {}
         }
     }
 
-    fn set(&mut self, setting: Setting, name: &Word) -> Result<(), Unknown> {
-        let name = name.as_str();
-        match setting {
-            Setting::Scene => self.put(self.scenes.named(name).ok_or(Unknown)?),
-            Setting::Mapper => self.mapper = Mapper::parse(name).ok_or(Unknown)?,
-            Setting::Order => self.order = Order::parse(name).ok_or(Unknown)?,
-        }
-        Ok(())
-    }
-
     /// Changes the scene. A different scene starts with its own motion.
-    fn put(&mut self, entry: Entry<'a>) {
-        if entry.name != self.entry.name {
-            self.entry = entry;
-            self.motion = Motion::OWN;
+    fn set_scene(&mut self, number: usize) {
+        if number != self.scene {
+            self.scene = number;
+            self.trajectory = Trajectory::UNSTEERED;
         }
     }
 }
@@ -380,149 +263,32 @@ fn within(mapper: Mapper, other: fn(Tolerance) -> Option<Tolerance>) -> Mapper {
     }
 }
 
-/// A change and its tick.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Noted {
-    tick: u32,
-    change: Change,
-}
-
-impl Noted {
-    /// An unused entry. It is all zeros, so that an empty log occupies no space in the kernel's image.
-    const NONE: Self = Self {
-        tick: 0,
-        change: Change::Act(Action::YawLeft),
-    };
-}
-
-/// Memory for a log's changes.
-pub(crate) type Notes = [Noted; Log::MAX];
-
-/// A log: a known state, and the changes since, with their ticks.
-#[derive(Debug)]
-pub(crate) struct Log<'a> {
-    /// The state before the first change.
-    start: State<'a>,
-    notes: &'a mut Notes,
-    len: usize,
-    /// Changes that were made and did not fit in the log.
-    lost: u32,
-}
-
-/// Why a change is not logged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum NotNoted {
-    /// Its tick is before the tick of the last change, which is this.
-    Before(u32),
-    /// The log is full.
-    Full,
-}
-
-impl<'a> Log<'a> {
-    /// Most changes. A push at its limit changes nothing and is not logged, so even a person who never stops
-    /// pressing keys adds only some hundred a minute.
-    pub const MAX: usize = 1024;
-
-    /// Memory for an empty log, all zeros.
-    pub const NOTES: Notes = [Noted::NONE; Self::MAX];
-
-    /// Returns a log without changes since `start`.
-    pub fn new(start: State<'a>, notes: &'a mut Notes) -> Self {
-        let (len, lost) = (0, 0);
-        Self {
-            start,
-            notes,
-            len,
-            lost,
-        }
-    }
-
-    /// Discards all changes and starts again with `start`.
-    pub fn restart(&mut self, start: State<'a>) {
-        (self.start, self.len, self.lost) = (start, 0, 0);
-    }
-
-    /// Returns the state before the first change.
-    pub fn start(&mut self) -> &mut State<'a> {
-        &mut self.start
-    }
-
-    /// Returns the changes with their ticks, which never decrease.
-    pub fn changes(&self) -> impl Iterator<Item = (u32, &Change)> {
-        self.notes[..self.len]
-            .iter()
-            .map(|noted| (noted.tick, &noted.change))
-    }
-
-    /// Returns how many changes were made and did not fit in the log.
-    pub fn lost(&self) -> u32 {
-        self.lost
-    }
-
-    /// Logs a change.
-    ///
-    /// # Errors
-    /// The tick is before that of the last change, or the log is full.
-    pub fn note(&mut self, tick: u32, change: Change) -> Result<(), NotNoted> {
-        let last = self.changes().last().map(|(tick, _)| tick);
-        if let Some(last) = last.filter(|&last| tick < last) {
-            return Err(NotNoted::Before(last));
-        }
-        let place = self.notes.get_mut(self.len).ok_or(NotNoted::Full)?;
-        *place = Noted { tick, change };
-        self.len += 1;
-        Ok(())
-    }
-
-    /// Logs a change that was made, or counts it as lost if that fails. It also fails when the tick counter
-    /// wraps, after 828 days.
-    pub fn keep(&mut self, tick: u32, change: Change) {
-        if self.note(tick, change).is_err() {
-            self.lost = self.lost.saturating_add(1);
-        }
-    }
-
-    /// Returns the state at a tick, or `None` if earlier changes were lost.
-    pub fn state(&self, tick: u32) -> Option<State<'a>> {
-        let mut state = self.start;
-        for (noted, change) in self.changes() {
-            if tick < noted {
-                return Some(state);
-            }
-            // A change with an unknown name is never logged.
-            let _ = state.change(noted, change);
-        }
-        (self.lost == 0).then_some(state)
-    }
-}
-
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     extern crate std;
     use super::*;
     use scene::Mesh;
     use scene::catalogue::Colours;
-    use std::boxed::Box;
     use std::vec::Vec;
     use texmap::Texture;
 
     /// Returns the state of a catalogue's scene with its own motion.
-    fn own(number: usize) -> State<'static> {
-        State::of(Scenes::new(None), CATALOGUE[number])
+    pub(crate) fn state_of(number: usize) -> State<'static> {
+        State::new(Scenes::new(None), number)
     }
 
     fn act(state: &mut State<'_>, tick: u32, action: Action) -> bool {
-        state.change(tick, &Change::Act(action)).unwrap()
+        state.apply(tick, StateChange::Act(action))
     }
 
-    fn any(random: &mut fastrand::Rng) -> Action {
+    pub(crate) fn any_action(random: &mut fastrand::Rng) -> Action {
         Action::ALL[random.usize(..Action::ALL.len())]
     }
 
     #[test]
-    fn a_show_that_is_not_steered_is_the_scenes_own() {
+    fn without_steering_a_pose_is_the_scene_s() {
         for (number, entry) in CATALOGUE.iter().enumerate() {
-            let state = own(number);
+            let state = state_of(number);
             for tick in [0, 1, 720, u32::MAX] {
                 assert_eq!(state.pose(tick), entry.pose(tick));
             }
@@ -531,29 +297,29 @@ mod tests {
 
     /// Moving the starting point to any tick changes no later pose.
     #[test]
-    fn a_pose_does_not_depend_on_when_it_was_looked_at() {
+    fn a_pose_does_not_depend_on_the_starting_point() {
         let mut random = seeded::generator();
         for _ in 0..200 {
-            let mut state = own(random.usize(..CATALOGUE.len()));
+            let mut state = state_of(random.usize(..CATALOGUE.len()));
             let mut tick = random.u32(..);
             for _ in 0..random.usize(..30) {
-                act(&mut state, tick, any(&mut random));
+                act(&mut state, tick, any_action(&mut random));
                 tick = tick.wrapping_add(random.u32(..100));
             }
-            let mut looked = state;
+            let mut moved = state;
             let end = tick.wrapping_add(1000);
             while tick != end {
-                looked.motion = looked.motion.at(tick);
+                moved.trajectory = moved.trajectory.at(tick);
                 tick = tick.wrapping_add(1);
             }
-            assert_eq!(looked.pose(end), state.pose(end));
+            assert_eq!(moved.pose(end), state.pose(end));
         }
     }
 
     #[test]
-    fn keys_held_down_stay_in_the_legal_ranges_and_come_to_nothing_more() {
+    fn a_repeated_action_stays_in_the_legal_range_and_ends() {
         for &action in Action::ALL {
-            let mut state = own(0);
+            let mut state = state_of(0);
             let toggles = matches!(
                 action,
                 Action::Pause
@@ -566,15 +332,18 @@ mod tests {
             );
             for tick in 0..3000 {
                 let changed = act(&mut state, tick, action);
-                assert!(!changed || tick < 2999 || toggles, "{action} goes on");
+                assert!(
+                    !changed || tick < 2999 || toggles,
+                    "{action} still changes the state"
+                );
                 let pose = state.pose(tick);
                 assert!((0..=Pose::MAX_DISTANCE).contains(&pose.distance));
             }
         }
         let mut random = seeded::generator();
-        let mut state = own(0);
+        let mut state = state_of(0);
         for tick in 0..20_000 {
-            act(&mut state, tick, any(&mut random));
+            act(&mut state, tick, any_action(&mut random));
             let pose = state.pose(tick + random.u32(..1000));
             assert!((0..=Pose::MAX_DISTANCE).contains(&pose.distance));
         }
@@ -582,7 +351,7 @@ mod tests {
 
     /// Checks where the nearest point of the ball moves, and for a roll its top.
     #[test]
-    fn each_turn_goes_the_way_of_its_name() {
+    fn each_turn_goes_in_the_direction_of_its_name() {
         const UNIT: i32 = 1 << 16;
         for (action, point, [x, y]) in [
             (Action::YawLeft, [0, 0, -UNIT], [-1, 0]),
@@ -592,10 +361,10 @@ mod tests {
             (Action::RollLeft, [0, -UNIT, 0], [-1, 0]),
             (Action::RollRight, [0, -UNIT, 0], [1, 0]),
         ] {
-            let mut motion = Motion::OWN;
-            motion.stop();
-            let mut state = own(0);
-            state.motion = motion;
+            let mut trajectory = Trajectory::UNSTEERED;
+            trajectory.stop();
+            let mut state = state_of(0);
+            state.trajectory = trajectory;
             act(&mut state, 0, action);
             let level = Pose {
                 yaw: 0,
@@ -603,7 +372,7 @@ mod tests {
                 roll: 0,
                 distance: 4 * UNIT,
             };
-            let turned = state.motion.at(10).steered(level);
+            let turned = state.trajectory.at(10).steered(level);
             let [to_x, to_y, _] = turned.orientation().turn(point);
             let near = |to: i32, from: i32| {
                 if (to - from).abs() < 300 {
@@ -621,8 +390,8 @@ mod tests {
     }
 
     #[test]
-    fn faster_and_slower_are_each_others_opposite_and_stop_is_still() {
-        let mut state = own(0);
+    fn slower_undoes_faster_and_stop_stops_all_motion() {
+        let mut state = state_of(0);
         let speed =
             |state: &State<'_>| state.pose(800).yaw.wrapping_sub(state.pose(720).yaw) as i32;
         let normal = speed(&state);
@@ -642,7 +411,7 @@ mod tests {
         act(&mut state, 5000, Action::Faster);
         assert_eq!(
             speed(&State {
-                motion: state.motion.starting(0),
+                trajectory: state.trajectory.starting(0),
                 ..state
             }),
             normal
@@ -652,9 +421,9 @@ mod tests {
     /// At any speed, the motion along tiles continues smoothly where the tiles repeat: no interpolated pose
     /// lies behind its neighbours, and no two consecutive poses are a tile apart.
     #[test]
-    fn a_walk_has_no_leap_at_a_tile_s_end() {
-        let mut state = own(0);
-        while state.entry.name != "corridor" {
+    fn a_walk_continues_smoothly_where_tiles_repeat() {
+        let mut state = state_of(0);
+        while state.entry().name != "corridor" {
             act(&mut state, 0, Action::NextScene);
         }
         act(&mut state, 0, Action::Faster);
@@ -673,8 +442,8 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_stands_and_steps_by_ticks() {
-        let mut state = own(0);
+    fn a_paused_pose_moves_only_by_steps() {
+        let mut state = state_of(0);
         let running = state;
         act(&mut state, 100, Action::Pause);
         assert_eq!(state.pose(200), running.pose(100));
@@ -686,9 +455,9 @@ mod tests {
     }
 
     #[test]
-    fn settings_go_around_and_tolerances_to_their_ends() {
-        let mut state = own(0);
-        let (mapper, order, scene) = (state.mapper, state.order, state.entry.name);
+    fn settings_wrap_and_tolerances_stop_at_their_limits() {
+        let mut state = state_of(0);
+        let (mapper, order, scene) = (state.mapper, state.order, state.scene);
         for _ in 0..Mapper::ALL.len() {
             act(&mut state, 0, Action::NextMapper);
         }
@@ -699,7 +468,7 @@ mod tests {
             act(&mut state, 0, Action::NextScene);
         }
         assert_eq!(
-            (state.mapper, state.order, state.entry.name),
+            (state.mapper, state.order, state.scene),
             (mapper, order, scene)
         );
         act(&mut state, 0, Action::NextMapper);
@@ -720,7 +489,7 @@ mod tests {
 
     /// A loaded model is the first scene, and the last one in the list.
     #[test]
-    fn a_model_is_a_scene_among_the_others() {
+    fn a_model_is_the_default_and_the_last_scene() {
         let mesh = Mesh {
             vertices: &[],
             corners: &[],
@@ -729,48 +498,37 @@ mod tests {
         };
         let model = Entry::loaded(mesh, Texture::DOT, Colours::BUILT_IN, &[0; modex::HEIGHT]);
         let scenes = Scenes::new(Some(model));
-        let mut state = State::of(scenes, scenes.default());
-        assert_eq!(state.entry.name, Entry::LOADED);
+        let mut state = State::new(scenes, scenes.default());
+        assert_eq!(state.entry().name, Entry::LOADED);
         for entry in &CATALOGUE {
             act(&mut state, 0, Action::NextScene);
-            assert_eq!(state.entry.name, entry.name);
+            assert_eq!(state.entry().name, entry.name);
         }
         act(&mut state, 0, Action::NextScene);
-        assert_eq!(state.entry.name, Entry::LOADED);
+        assert_eq!(state.entry().name, Entry::LOADED);
         act(&mut state, 0, Action::Reset);
-        assert_eq!(state.entry.name, Entry::LOADED);
+        assert_eq!(state.entry().name, Entry::LOADED);
         let by_name = Change::Set(Setting::Scene, Word::new(Entry::LOADED).unwrap());
-        assert_eq!(own(0).change(0, &by_name), Err(Unknown));
+        assert_eq!(
+            scenes.resolve(by_name),
+            Ok(StateChange::Scene(CATALOGUE.len()))
+        );
+        assert!(Scenes::new(None).resolve(by_name).is_err());
     }
 
     #[test]
-    fn a_log_knows_the_state_at_every_tick_until_it_is_full() {
-        let mut random = seeded::generator();
-        let mut notes = Box::new(Log::NOTES);
-        let start = own(0);
-        let mut log = Log::new(start, &mut notes);
-        let (mut state, mut tick, mut poses) = (start, 0, Vec::new());
-        while log.changes().count() < Log::MAX {
-            let action = any(&mut random);
-            if action != Action::NextScene && act(&mut state, tick, action) {
-                log.keep(tick, Change::Act(action));
-            }
-            if random.bool() {
-                poses.push((tick, state.pose(tick)));
-                tick += random.u32(1..5);
-            }
+    fn a_change_is_displayed_as_it_was_requested() {
+        let scenes = Scenes::new(None);
+        for text in [
+            "stop",
+            "scene knot",
+            "mapper exact",
+            "mapper within-3/8",
+            "order buffer",
+        ] {
+            let change = Change::parse(text.split(' ')).unwrap();
+            let resolved = scenes.resolve(change).unwrap();
+            assert_eq!(std::format!("{}", scenes.display(resolved)), text);
         }
-        for (tick, pose) in &poses {
-            assert_eq!(log.state(*tick).unwrap().pose(*tick), *pose, "at {tick}");
-        }
-        assert!(log.state(tick).is_some());
-        let stop = Change::Act(Action::Stop);
-        assert!(matches!(log.note(0, stop), Err(NotNoted::Before(last)) if last <= tick));
-        assert_eq!(log.note(tick, stop), Err(NotNoted::Full));
-        log.keep(tick, stop);
-        assert_eq!(log.lost(), 1);
-        assert!(log.state(tick).is_none() && log.state(0).is_some());
-        log.restart(start);
-        assert_eq!((log.lost(), log.changes().count()), (0, 0));
     }
 }

@@ -1,24 +1,24 @@
-//! Effects of the serial line on a demo, and of commands on the card.
+//! How the serial line's errors reach a demo, and how often commands reset the card.
 
-mod asked;
+mod common;
 
-use asked::{ask, done, memory};
-use demo::Show;
+use common::{ask, carry_out, memory};
+use demo::Demo;
 use modex::Purpose;
 use modex::registers::MISC_WRITE;
 use protocol::Reception;
 use vga::Vga;
 
 /// Returns how often the card's mode was set.
-fn mode_sets(show: &mut Show<'_, Vga>) -> u64 {
-    show.bus().port_writes(Purpose::Setup, MISC_WRITE, None)
+fn mode_sets(demo: &mut Demo<'_, Vga>) -> u64 {
+    demo.bus().port_writes(Purpose::Setup, MISC_WRITE, None)
 }
 
 #[test]
-fn each_command_resets_the_card_once_at_most() {
+fn each_command_resets_the_card_at_most_once() {
     let mut memory = memory();
-    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
-    let mut before = mode_sets(&mut show);
+    let mut demo = Demo::new(&mut memory, Vga::new(), None).unwrap();
+    let mut before = mode_sets(&mut demo);
     assert_eq!(before, 1);
     for (line, resets) in [
         ("steer next-scene", 1),
@@ -36,8 +36,8 @@ fn each_command_resets_the_card_once_at_most() {
         ("scene knot", 1),
         ("show 7", 1),
     ] {
-        done(&mut show, line, 0);
-        let after = mode_sets(&mut show);
+        carry_out(&mut demo, line, 0);
+        let after = mode_sets(&mut demo);
         assert_eq!(after - before, resets, "{line}");
         before = after;
     }
@@ -46,35 +46,35 @@ fn each_command_resets_the_card_once_at_most() {
 #[test]
 fn a_line_with_a_lost_byte_is_not_carried_out() {
     let mut memory = memory();
-    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
-    done(&mut show, "hold", 0);
-    let mut said = Vec::new();
+    let mut demo = Demo::new(&mut memory, Vga::new(), None).unwrap();
+    carry_out(&mut demo, "hold", 0);
+    let mut answers = Vec::new();
     // The bytes that arrive look like a command.
     for &byte in b"scene cu" {
-        show.receive(byte, 0, &mut |line| said.push(line.to_string()));
+        demo.receive(byte, 0, &mut |line| answers.push(line.to_string()));
     }
-    show.damage();
+    demo.damage();
     for &byte in b"be\rmapper exact\r" {
-        show.receive(byte, 0, &mut |line| said.push(line.to_string()));
+        demo.receive(byte, 0, &mut |line| answers.push(line.to_string()));
     }
-    let refused = "error a line with bytes that were lost or damaged on the wire";
-    assert_eq!(said, [refused, "ok mapper exact"]);
-    let state = done(&mut show, "state", 0);
+    let refused = "error bytes of the line were lost or damaged on the wire; send the line again";
+    assert_eq!(answers, [refused, "ok mapper exact"]);
+    let state = carry_out(&mut demo, "state", 0);
     assert!(state.contains(&"scene ball".into()), "{state:?}");
 }
 
 #[test]
-fn what_went_wrong_on_the_line_is_in_the_state() {
+fn the_state_contains_the_errors_of_the_line() {
     let mut memory = memory();
-    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
-    let last = |show: &mut Show<'_, Vga>| ask(show, "state", 0).into_iter().rev().nth(1);
-    let none = "serial overruns 0 damaged 0 full 0";
-    assert_eq!(last(&mut show).as_deref(), Some(none));
-    show.set_reception(Reception {
+    let mut demo = Demo::new(&mut memory, Vga::new(), None).unwrap();
+    let last = |demo: &mut Demo<'_, Vga>| ask(demo, "state", 0).into_iter().rev().nth(1);
+    let no_errors = "serial overruns 0 damaged 0 full 0";
+    assert_eq!(last(&mut demo).as_deref(), Some(no_errors));
+    demo.set_reception(Reception {
         overruns: 1,
         damaged: 2,
         full: 3,
     });
-    let some = "serial overruns 1 damaged 2 full 3";
-    assert_eq!(last(&mut show).as_deref(), Some(some));
+    let errors = "serial overruns 1 damaged 2 full 3";
+    assert_eq!(last(&mut demo).as_deref(), Some(errors));
 }

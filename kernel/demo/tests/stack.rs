@@ -1,25 +1,25 @@
-//! The demo's need for stack on the host.
+//! How much stack the demo needs on the host.
 
-mod asked;
+mod common;
 
 use std::thread;
 
-use asked::done;
-use demo::Show;
+use common::carry_out;
+use demo::Demo;
 use vga::Vga;
 
 /// A quarter of a thread's default stack.
 const STACK: usize = 512 << 10;
 
-/// The demo's memory is built in place, so a small stack is enough for everything that the demo does.
+/// The demo's memory is built in place, so a small stack is enough for every command.
 #[test]
 fn a_small_stack_is_enough() {
     let work = || {
-        let mut memory = asked::memory();
-        let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
+        let mut memory = common::memory();
+        let mut demo = Demo::new(&mut memory, Vga::new(), None).unwrap();
         for name in ["info", "help", "quality", "split"] {
-            show.present(1, &mut |_| {});
-            done(&mut show, &format!("steer {name}"), 1);
+            demo.present(1, &mut |_| {});
+            carry_out(&mut demo, &format!("steer {name}"), 1);
         }
         for scene in ["ball", "cube", "knot"] {
             for order in ["polygons", "buffer"] {
@@ -33,7 +33,7 @@ fn a_small_stack_is_enough() {
                     "checksums all".into(),
                     "log".into(),
                 ] {
-                    done(&mut show, &line, 0);
+                    carry_out(&mut demo, &line, 0);
                 }
             }
         }

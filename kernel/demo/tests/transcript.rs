@@ -5,25 +5,25 @@
 //! After an intended change, look at the difference, and run
 //! `UPDATE_EXPECT=1 cargo test -p demo --test transcript`.
 
-mod asked;
+mod common;
 
 use std::fmt::Write;
 
-use asked::{ask, memory};
-use demo::Show;
+use common::{ask, memory};
+use demo::Demo;
 use expect_test::expect_file;
 use protocol::Reception;
 use vga::Vga;
 
-/// The session's steps. `tick N` shows the running demo's frame of a tick, if it is due; `took N` sets how
-/// many microseconds the frame needed; `key` sends scan codes; `lose` sets losses of the keyboard and the
+/// The session's steps. `tick N` shows the running demo's frame of a tick, if it is due; `frame-time N`
+/// sets how many microseconds the frame needed; `key` sends scan codes; `lose` sets losses of the keyboard and the
 /// serial line; `#` begins a comment; everything else is a command.
 const SESSION: &str = include_str!("session.txt");
 
 #[test]
 fn a_session_gives_the_transcript() {
     let mut memory = memory();
-    let mut show = Show::new(&mut memory, Vga::new(), None).unwrap();
+    let mut demo = Demo::new(&mut memory, Vga::new(), None).unwrap();
     let (mut transcript, mut tick) = (String::new(), 0);
     for line in SESSION.lines() {
         writeln!(transcript, "> {line}").unwrap();
@@ -32,32 +32,32 @@ fn a_session_gives_the_transcript() {
             "#" => {}
             "tick" => {
                 tick = rest.parse().unwrap();
-                if show.is_due(tick) {
-                    let mut said = |line: std::fmt::Arguments<'_>| {
+                if demo.is_due(tick) {
+                    let mut write = |line: std::fmt::Arguments<'_>| {
                         writeln!(transcript, "{line}").unwrap();
                     };
-                    show.present(tick, &mut said);
+                    demo.present(tick, &mut write);
                 } else {
                     writeln!(transcript, "(not due)").unwrap();
                 }
-                assert_eq!(show.bus().take_faults(), [], "{line}");
+                assert_eq!(demo.bus().take_faults(), [], "{line}");
             }
-            "took" => show.took(rest.parse().unwrap()),
+            "frame-time" => demo.add_frame_time(rest.parse().unwrap()),
             "key" => {
                 for code in rest.split(' ') {
-                    show.key(u8::from_str_radix(code, 16).unwrap(), tick);
+                    demo.key(u8::from_str_radix(code, 16).unwrap(), tick);
                 }
             }
             "lose" => {
-                show.set_lost_keys(3);
-                show.set_reception(Reception {
+                demo.set_lost_keys(3);
+                demo.set_reception(Reception {
                     overruns: 1,
                     damaged: 2,
                     full: 4,
                 });
             }
             _ => {
-                for answer in ask(&mut show, line, tick) {
+                for answer in ask(&mut demo, line, tick) {
                     writeln!(transcript, "{answer}").unwrap();
                 }
             }
