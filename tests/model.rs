@@ -128,7 +128,7 @@ fn a_damaged_ramdisk_is_told_and_the_built_in_scenes_are_there() {
     machine.wait_until_running().unwrap();
     let said = machine.said_of_pack().unwrap().to_string();
     assert!(
-        said.starts_with("refused model: its header says checksum "),
+        said.starts_with("refused model: the header states checksum "),
         "{said}"
     );
     let mut memory = card::memory();

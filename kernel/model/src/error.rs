@@ -20,15 +20,15 @@ pub enum ModelError {
     Version(u32),
     /// The length in the header is wrong.
     Length {
-        /// Length in the header.
-        said: u32,
+        /// Length that the header states.
+        stated: u32,
         /// Length of the model file.
         actual: usize,
     },
     /// The checksum in the header is wrong: a byte was changed.
     Checksum {
-        /// Checksum in the header.
-        said: u32,
+        /// Checksum that the header states.
+        stated: u32,
         /// Checksum of the bytes.
         computed: u32,
     },
@@ -50,7 +50,7 @@ pub enum ModelError {
     },
     /// The texture is not legal.
     Texture(TextureError),
-    /// This entry of the palette has a part that does not fit 6 bits.
+    /// This entry of the palette has a component that does not fit 6 bits.
     Colour(usize),
     /// This vertex is too far from the origin.
     Vertex(usize),
@@ -64,17 +64,17 @@ pub enum ModelError {
         vertices: usize,
     },
     /// The texture coordinates of this corner are outside the texture.
-    CornerPlace(usize),
+    CornerTexture(usize),
     /// This face has too few or too many corners.
     FaceCorners(usize),
     /// This face's normal is not a unit vector.
     FaceNormal(usize),
     /// The faces' counts of corners do not add up to the corners of the model file.
-    Shared {
+    CornerCount {
         /// Corners that the faces use.
         used: usize,
         /// Corners that the model file has.
-        there: usize,
+        present: usize,
     },
 }
 
@@ -87,34 +87,37 @@ impl From<TextureError> for ModelError {
 impl fmt::Display for ModelError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NotAModelFile => f.write_str("it does not begin as a model file"),
+            Self::NotAModelFile => f.write_str("the file does not begin as a model file"),
             Self::Short(len) => write!(f, "{len} bytes are too few for a model file"),
             Self::TooLong(len) => {
                 write!(
                     f,
-                    "it has {len} bytes; a model file has at most {MAX_BYTES}"
+                    "the file has {len} bytes; a model file has at most {MAX_BYTES}"
                 )
             }
             Self::Version(version) => write!(
                 f,
-                "it is a model file of version {version}; this program reads version {VERSION}"
+                "the file has version {version} of the format; this program reads version {VERSION}"
             ),
-            Self::Length { said, actual } => {
-                write!(f, "its header says {said} bytes, and it has {actual}")
+            Self::Length { stated, actual } => {
+                write!(
+                    f,
+                    "the header states {stated} bytes, but the file has {actual}"
+                )
             }
-            Self::Checksum { said, computed } => write!(
+            Self::Checksum { stated, computed } => write!(
                 f,
-                "its header says checksum {said:08x}, its bytes have {computed:08x}"
+                "the header states checksum {stated:08x}, but the bytes have {computed:08x}"
             ),
             Self::TooMany { what, count, most } => {
-                write!(f, "it has {count} {what}; there is room for {most}")
+                write!(f, "the file has {count} {what}; at most {most} are allowed")
             }
             Self::Parts { parts, actual } => write!(
                 f,
-                "what its header counts takes {parts} bytes, and it has {actual}"
+                "the counts in the header need {parts} bytes, but the file has {actual}"
             ),
             Self::Texture(error) => write!(f, "{error}"),
-            Self::Colour(i) => write!(f, "colour {i} has a part above 63"),
+            Self::Colour(i) => write!(f, "colour {i} has a component above 63"),
             Self::Vertex(i) => write!(f, "vertex {i} is outside +-{MAX_EXTENT}"),
             Self::CornerVertex {
                 corner,
@@ -124,16 +127,19 @@ impl fmt::Display for ModelError {
                 f,
                 "corner {corner} refers to vertex {vertex}, but the mesh has {vertices} vertices"
             ),
-            Self::CornerPlace(i) => write!(f, "corner {i} is outside the texture"),
+            Self::CornerTexture(i) => write!(f, "corner {i} is outside the texture"),
             Self::FaceCorners(i) => {
                 write!(
                     f,
                     "face {i} has fewer than 3 or more than {MAX_CORNERS} corners"
                 )
             }
-            Self::FaceNormal(i) => write!(f, "the normal of face {i} is no unit vector"),
-            Self::Shared { used, there } => {
-                write!(f, "its faces take {used} corners, and it has {there}")
+            Self::FaceNormal(i) => write!(f, "the normal of face {i} is not a unit vector"),
+            Self::CornerCount { used, present } => {
+                write!(
+                    f,
+                    "the faces use {used} corners, but the file has {present}"
+                )
             }
         }
     }

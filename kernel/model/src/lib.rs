@@ -1,4 +1,4 @@
-//! Packs: the file format of a model, for the kernel and for the host program with the emulated VGA.
+//! Model files: the file format of a model, for the kernel and for the host program with the emulated VGA.
 //!
 //! The host computes everything once: mesh, texels, palette and light table. Kernel and host then read the
 //! same bytes, so they draw the same frame, and a model file's checksum identifies the model.
@@ -29,10 +29,40 @@
 //! # Checks
 //!
 //! [`ModelFile::parse`] trusts nothing, because the bytes may come from anywhere. The checksum finds any
-//! accidental change. But a model file can be forged with a matching checksum, so every count, index and range is
-//! also checked. A scene made of an accepted model file is within every limit of [`scene::Stage`] and the mappers,
-//! and can make none of them panic. Whether the scene looks good is not checked: faces may be bent, inside
+//! accidental change. But a model file can be forged with a matching checksum, so every count, index and
+//! range is also checked. A scene made of an accepted model file is within every limit of the renderer and the
+//! mappers, and cannot make them panic. Whether the scene looks good is not checked: faces may be bent, inside
 //! out or invisible.
+//!
+//! # Example
+//!
+//! ```
+//! use model::{ModelFile, Parts};
+//! use scene::catalogue::Colours;
+//! use scene::{Corner, Face, Mesh};
+//! use texmap::Texture;
+//!
+//! // A triangle with a texture of one texel.
+//! let face = Face {
+//!     corners: 3,
+//!     normal: [0, 0, -(1 << 14)],
+//!     ..Face::default()
+//! };
+//! let parts = Parts {
+//!     mesh: Mesh {
+//!         vertices: &[[0, 0, 0], [1 << 16, 0, 0], [0, 1 << 16, 0]],
+//!         corners: &[0, 1, 2].map(|vertex| Corner { vertex, u: 0, v: 0 }),
+//!         faces: &[face],
+//!         convex: false,
+//!     },
+//!     texture: Texture::new(&[7], 1, 1).unwrap(),
+//!     colours: Colours::BUILT_IN,
+//!     background: &[0; modex::HEIGHT],
+//! };
+//! let mut bytes = Vec::new();
+//! let checksum = parts.write(|part| bytes.extend_from_slice(part));
+//! assert_eq!(ModelFile::parse(&bytes).unwrap().checksum(), checksum);
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 
@@ -217,14 +247,14 @@ impl<'p> ModelFile<'p> {
         if version != VERSION {
             return Err(ModelError::Version(version));
         }
-        let said = long(12);
-        if said as usize != bytes.len() {
+        let stated = long(12);
+        if stated as usize != bytes.len() {
             let actual = bytes.len();
-            return Err(ModelError::Length { said, actual });
+            return Err(ModelError::Length { stated, actual });
         }
-        let (said, computed) = (long(16), CRC.checksum(&bytes[SUMMED..]));
-        if said != computed {
-            return Err(ModelError::Checksum { said, computed });
+        let (stated, computed) = (long(16), CRC.checksum(&bytes[SUMMED..]));
+        if stated != computed {
+            return Err(ModelError::Checksum { stated, computed });
         }
         let [vertices, corners, faces] = [20, 22, 24].map(|at| usize::from(word(at)));
         let (width, height) = (word(26), word(28));
@@ -253,7 +283,7 @@ impl<'p> ModelFile<'p> {
         let background = whole(reader.take(HEIGHT));
         let texture = Texture::new(reader.take(texels), width, height)?;
         let model_file = Self {
-            checksum: said,
+            checksum: stated,
             colours: Colours { palette, light },
             background,
             texture,
@@ -288,7 +318,7 @@ impl<'p> ModelFile<'p> {
                 });
             }
             if !(0..=width).contains(&corner.u) || !(0..=height).contains(&corner.v) {
-                return Err(ModelError::CornerPlace(i));
+                return Err(ModelError::CornerTexture(i));
             }
         }
         let mut first = 0;
@@ -305,9 +335,9 @@ impl<'p> ModelFile<'p> {
             first += usize::from(face.corners);
         }
         if first != self.corners.len() {
-            return Err(ModelError::Shared {
+            return Err(ModelError::CornerCount {
                 used: first,
-                there: self.corners.len(),
+                present: self.corners.len(),
             });
         }
         Ok(())
@@ -427,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_comes_back() {
+    fn a_parsed_model_file_has_the_written_scene() {
         let bytes = cube();
         let model_file = ModelFile::parse(&bytes).unwrap();
         let mut arena = in_place::boxed!(Arena);
@@ -453,7 +483,7 @@ mod tests {
     }
 
     #[test]
-    fn any_changed_byte_is_found() {
+    fn every_changed_byte_is_found() {
         let good = cube();
         for at in 0..good.len() {
             let mut bytes = good.clone();
@@ -466,30 +496,39 @@ mod tests {
     }
 
     #[test]
-    fn what_is_out_of_range_is_named_though_the_checksum_fits() {
+    fn an_illegal_value_is_named_even_if_the_checksum_is_right() {
         const FIXED: usize = HEADER + PALETTE + LIGHT + HEIGHT;
         const VERTICES: usize = FIXED + (SIDES.0 * SIDES.1) as usize;
         const CORNERS: usize = VERTICES + 24 * VERTEX;
         const FACES: usize = CORNERS + 24 * CORNER;
-        let put = |at: usize, new: &'static [u8]| {
+        let with = |at: usize, new: &'static [u8]| {
             forged(|bytes| bytes[at..at + new.len()].copy_from_slice(new))
         };
         for (bytes, why) in [
-            (put(0, b"c"), "does not begin as a model file"),
+            (with(0, b"c"), "does not begin as a model file"),
             (Vec::new(), "does not begin as a model file"),
             (MAGIC.to_vec(), "8 bytes are too few"),
-            (put(8, &[2]), "of version 2; this program reads version 1"),
+            (
+                with(8, &[2]),
+                "version 2 of the format; this program reads version 1",
+            ),
             (std::vec![0; MAX_BYTES], "does not begin as a model file"),
             (std::vec![0; MAX_BYTES + 1], "has at most 524288"),
-            (put(20, &[1, 16]), "4097 vertices; there is room for 4096"),
-            (put(22, &[1, 96]), "24577 corners; there is room for 24576"),
-            (put(24, &[1, 32]), "8193 faces; there is room for 8192"),
-            (put(24, &[7]), "what its header counts takes"),
+            (
+                with(20, &[1, 16]),
+                "4097 vertices; at most 4096 are allowed",
+            ),
+            (
+                with(22, &[1, 96]),
+                "24577 corners; at most 24576 are allowed",
+            ),
+            (with(24, &[1, 32]), "8193 faces; at most 8192 are allowed"),
+            (with(24, &[7]), "the counts in the header need"),
             (
                 forged(|bytes| bytes.push(0)),
-                "what its header counts takes",
+                "the counts in the header need",
             ),
-            (put(26, &[0, 0]), "what its header counts takes"),
+            (with(26, &[0, 0]), "the counts in the header need"),
             (
                 forged(|bytes| {
                     bytes[26] = 0;
@@ -497,44 +536,50 @@ mod tests {
                 }),
                 "a texture of 0 x 5 texels",
             ),
-            (put(HEADER + 5, &[64]), "colour 1 has a part above 63"),
-            (put(VERTICES + 15, &[0x7F]), "vertex 1 is outside"),
-            (put(VERTICES + 15, &[0x80]), "vertex 1 is outside"),
+            (with(HEADER + 5, &[64]), "colour 1 has a component above 63"),
+            (with(VERTICES + 15, &[0x7F]), "vertex 1 is outside"),
+            (with(VERTICES + 15, &[0x80]), "vertex 1 is outside"),
             (
-                put(CORNERS, &[24]),
+                with(CORNERS, &[24]),
                 "corner 0 refers to vertex 24, but the mesh has 24 vertices",
             ),
             (
-                put(CORNERS + 15, &[0xFF]),
+                with(CORNERS + 15, &[0xFF]),
                 "corner 1 is outside the texture",
             ),
-            (put(CORNERS + 14, &[8]), "corner 1 is outside the texture"),
-            (put(FACES, &[2]), "face 0 has fewer than 3"),
+            (with(CORNERS + 14, &[8]), "corner 1 is outside the texture"),
+            (with(FACES, &[2]), "face 0 has fewer than 3"),
             (
-                put(FACES + 8, &[12]),
+                with(FACES + 8, &[12]),
                 "face 1 has fewer than 3 or more than 11",
             ),
-            (put(FACES + 2, &[0, 64]), "the normal of face 0"),
-            (put(FACES + 2, &[0, 64, 1, 1, 0, 0]), "the normal of face 0"),
-            (put(FACES + 6, &[0, 0]), "the normal of face 0"),
-            (put(FACES, &[5]), "its faces take 25 corners, and it has 24"),
+            (with(FACES + 2, &[0, 64]), "the normal of face 0"),
+            (
+                with(FACES + 2, &[0, 64, 1, 1, 0, 0]),
+                "the normal of face 0",
+            ),
+            (with(FACES + 6, &[0, 0]), "the normal of face 0"),
+            (
+                with(FACES, &[5]),
+                "the faces use 25 corners, but the file has 24",
+            ),
         ] {
             let error = ModelFile::parse(&bytes).unwrap_err().to_string();
-            assert!(error.contains(why), "{error}, and not {why}");
+            assert!(error.contains(why), "{error}: it should contain '{why}'");
         }
         // The largest normal that rounding may produce is accepted: a squared length of 2^28 + 2^16.
-        ModelFile::parse(&put(FACES + 2, &[0, 64, 0, 1, 0, 0])).unwrap();
+        ModelFile::parse(&with(FACES + 2, &[0, 64, 0, 1, 0, 0])).unwrap();
         let mut long = cube();
         long.push(0);
         let error = ModelFile::parse(&long).unwrap_err().to_string();
         assert!(
-            error.contains("header says 7793 bytes, and it has 7794"),
+            error.contains("the header states 7793 bytes, but the file has 7794"),
             "{error}"
         );
     }
 
     #[test]
-    fn what_is_just_inside_the_limits_can_be_drawn() {
+    fn a_model_at_the_limits_can_be_drawn() {
         let texels = std::vec![0; 1 << 16];
         let colours = Colours::BUILT_IN;
         let background = Entry::parse("cube").unwrap().scene(&[]).background;
