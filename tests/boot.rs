@@ -249,7 +249,7 @@ fn a_panic_is_told_with_its_place() {
         report[0].starts_with("panic at kernel/src/machine.rs:"),
         "{report:?}"
     );
-    assert_eq!(report[1], "asked to, by 'fail panic'");
+    assert_eq!(report[1], "'fail panic' requested this panic");
 }
 
 /// The line is locked and half written; the report must pass both.
@@ -259,7 +259,7 @@ fn a_panic_in_the_middle_of_a_line_is_told_whole() {
     let Verdict::Panic { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
-    assert_eq!(report[1], "asked to, by 'fail panic-in-line'");
+    assert_eq!(report[1], "'fail panic-in-line' requested this panic");
 }
 
 /// The kernel ends while commands are pending: its last message must still be read.
@@ -271,7 +271,7 @@ fn a_panic_with_commands_under_way_is_told_whole() {
     let Verdict::Panic { report } = &judged.0.verdict else {
         panic!("{}", judged.0);
     };
-    assert_eq!(report[1], "asked to, by 'fail panic'");
+    assert_eq!(report[1], "'fail panic' requested this panic");
     assert!(
         judged
             .0
@@ -335,7 +335,7 @@ fn an_adapter_that_does_not_take_the_mode_is_named() {
     };
     assert_eq!(
         report[0],
-        "adapter does not take Mode X: the window at A0000h is not planar: at offset 0000 plane 0 \
+        "adapter does not support Mode X: the window at A0000h is not planar: at offset 0000 plane 0 \
          reads 54 after 51 was stored"
     );
     assert_eq!(judged.0.verdict.exit_code(), 17);

@@ -17,7 +17,7 @@ use bootloader_api::{BootInfo, BootloaderConfig};
 use modex::SetError;
 use protocol::{Exit, FailKind, HELLO, PROTOCOL};
 
-pub use vga::Window;
+pub use vga::HardwareVga;
 
 /// Physical address of the card's window.
 const WINDOW: u64 = 0xA_0000;
@@ -34,7 +34,7 @@ pub const BOOT: BootloaderConfig = {
 #[derive(Debug)]
 pub struct Machine {
     /// The VGA.
-    pub vga: Window,
+    pub vga: HardwareVga,
     /// The image's ramdisk, as the boot loader has read it; `None` if the image has none.
     pub ramdisk: Option<&'static [u8]>,
 }
@@ -59,7 +59,7 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     let base = NonNull::new((offset + WINDOW) as *mut u8).expect("the window is not at zero");
     // SAFETY: the boot loader maps all physical memory at `offset`, including the card's window, for as long
     // as the kernel runs. No other pointer to the window is made.
-    let vga = unsafe { Window::new(base) };
+    let vga = unsafe { HardwareVga::new(base) };
     let ramdisk = boot_info.ramdisk_addr.into_option().map(|address| {
         // SAFETY: the boot loader maps `ramdisk_len` bytes of the ramdisk at this address for as long as the
         // kernel runs. Nothing else points to the bytes, and no code writes them.
@@ -103,7 +103,7 @@ pub fn stop() -> ! {
 /// Fails in the requested way.
 pub fn fail(kind: FailKind) -> ! {
     match kind {
-        FailKind::Panic => panic!("asked to, by 'fail panic'"),
+        FailKind::Panic => panic!("'fail panic' requested this panic"),
         FailKind::PanicInLine => panic_in_line(),
         FailKind::PageFault => cpu::page_fault(),
         FailKind::StackOverflow => cpu::stack_overflow(),
@@ -120,12 +120,12 @@ pub fn fail(kind: FailKind) -> ! {
 }
 
 fn panic_in_line() -> ! {
-    struct Broken;
-    impl core::fmt::Display for Broken {
+    struct Panics;
+    impl core::fmt::Display for Panics {
         fn fmt(&self, _: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-            panic!("asked to, by 'fail panic-in-line'")
+            panic!("'fail panic-in-line' requested this panic")
         }
     }
-    serial::line(format_args!("half a line {Broken}"));
-    unreachable!("a line with a panic in it was written")
+    serial::line(format_args!("half a line {Panics}"));
+    unreachable!("the panic in the line ended the program")
 }

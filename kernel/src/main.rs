@@ -3,8 +3,7 @@
 //! The kernel contains only the access to the hardware: ports, video memory, interrupts and the serial line.
 //! All of that is in [`machine`], with all of this crate's `unsafe` code. The crate [`demo`] draws frames and
 //! answers commands, and runs on the host as well. A panic, a CPU exception or an unfit display adapter is
-//! reported as text on the serial line and ends QEMU with a code for its kind. The kernel never restarts on
-//! its own.
+//! reported as text on the serial line and ends QEMU with a code for its kind. The kernel never restarts.
 //!
 //! The kernel also compiles for the host, where it prints how to run it instead. Only the entry point and the
 //! panic handler are limited to the bare machine, so clippy and editors see every other line.
@@ -69,7 +68,9 @@ fn model_file_of(ramdisk: &'static [u8]) -> Option<ModelFile<'static>> {
             Some(model_file)
         }
         Err(error) => {
-            serial::line(format_args!("{REFUSED} model: {error}"));
+            serial::line(format_args!(
+                "{REFUSED} model: {error}; import the model again"
+            ));
             None
         }
     }
@@ -90,6 +91,8 @@ fn main() {
     let kernel: (fn(&'static mut BootInfo) -> !, _) = (start, &BOOT);
     let report = machine::report::panic;
     core::hint::black_box((kernel, report));
-    eprintln!("this is the bare machine's program: `cargo run` in the workspace boots it in QEMU");
+    eprintln!(
+        "crystal-ball-kernel runs on the bare machine only; use `cargo run` in the workspace to boot it in QEMU"
+    );
     std::process::exit(2);
 }

@@ -55,6 +55,8 @@ fn main() {
     let kernel: (fn(&'static mut BootInfo) -> !, _) = (start, &BOOT);
     let report = machine::report::panic;
     core::hint::black_box((kernel, report));
-    eprintln!("this is the bare machine's program: the host program boots it to measure");
+    eprintln!(
+        "crystal-ball-measure runs on the bare machine only; use `cargo trade` in the workspace to boot it in QEMU"
+    );
     std::process::exit(2);
 }

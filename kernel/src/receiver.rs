@@ -86,7 +86,7 @@ impl<const SIZE: usize> Receiver<SIZE> {
             if status == NOTHING {
                 return;
             }
-            self.note(status);
+            self.count_errors(status);
             if status & DATA_READY == 0 {
                 return;
             }
@@ -124,15 +124,15 @@ impl<const SIZE: usize> Receiver<SIZE> {
 
     /// Returns whether the transmitter accepts bytes. Senders must ask here, because reading Line Status
     /// clears its errors. Called with interrupts off, so that the handler moves no byte between the read and
-    /// the note of its errors.
+    /// the count of its errors.
     pub fn can_send(&self, uart: &mut impl Uart) -> bool {
         let status = uart.line_status();
-        self.note(status);
+        self.count_errors(status);
         status & TRANSMITTER_READY != 0
     }
 
     /// Counts the errors in a value of Line Status, and marks the bytes that they affect.
-    fn note(&self, status: u8) {
+    fn count_errors(&self, status: u8) {
         if status & OVERRUN != 0 {
             self.overruns.fetch_add(1, Ordering::Relaxed);
             // The FIFO was full when the byte was lost, and no byte was removed from it since. The gap is
@@ -176,7 +176,7 @@ mod tests {
 
     /// A UART with a FIFO of 16 bytes, as its datasheet describes it.
     #[derive(Default)]
-    struct Model {
+    struct SimulatedUart {
         fifo: VecDeque<(u8, u8)>,
         overrun: u8,
         on: bool,
@@ -186,7 +186,7 @@ mod tests {
         busy: bool,
     }
 
-    impl Model {
+    impl SimulatedUart {
         fn on() -> Self {
             let on = true;
             Self {
@@ -211,7 +211,7 @@ mod tests {
         }
     }
 
-    impl Uart for Model {
+    impl Uart for SimulatedUart {
         fn line_status(&mut self) -> u8 {
             let next = self.fifo.front_mut();
             let ready = if next.is_some() { DATA_READY } else { 0 };
@@ -231,16 +231,16 @@ mod tests {
 
     fn fetch_all<const SIZE: usize>(
         receiver: &Receiver<SIZE>,
-        uart: &mut Model,
+        uart: &mut SimulatedUart,
         lines: &mut Lines,
-        heard: &mut Vec<Result<String, String>>,
+        received_lines: &mut Vec<Result<String, String>>,
     ) {
         while let Some(received) = receiver.fetch(uart) {
             if received.damaged {
                 lines.damage();
             }
             if let Some(line) = lines.push(received.byte) {
-                heard.push(line.map(str::to_owned).map_err(|noise| noise.to_string()));
+                received_lines.push(line.map(str::to_owned).map_err(|error| error.to_string()));
             }
         }
     }
@@ -253,7 +253,7 @@ mod tests {
         let bytes: Vec<u8> = sent.join("\r").into_bytes();
         assert!(bytes.len() >= 3_400, "{}", bytes.len());
         let receiver = Receiver::<4096>::new();
-        let mut uart = Model::on();
+        let mut uart = SimulatedUart::on();
         for &byte in bytes.iter().chain(b"\r") {
             uart.arrive(byte, 0);
             if uart.requests() {
@@ -262,19 +262,19 @@ mod tests {
         }
         // The FIFO's time-out delivers the rest.
         receiver.take(&mut uart);
-        let (mut lines, mut heard) = (Lines::new(), Vec::new());
-        fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
+        let (mut lines, mut received_lines) = (Lines::new(), Vec::new());
+        fetch_all(&receiver, &mut uart, &mut lines, &mut received_lines);
         let expected: Vec<_> = sent.into_iter().map(Ok).collect();
-        assert_eq!(heard, expected);
+        assert_eq!(received_lines, expected);
         assert_eq!((receiver.overruns(), receiver.pauses()), (0, 0));
         assert!(!receiver.has_received());
     }
 
     /// A sender that waits while the FIFO is full loses nothing, however small the ring is.
     #[test]
-    fn a_full_ring_holds_the_sender_up() {
+    fn a_full_ring_makes_the_sender_wait() {
         let receiver = Receiver::<16>::new();
-        let mut uart = Model::on();
+        let mut uart = SimulatedUart::on();
         uart.waits = true;
         let mut sent = (0..5_000u32).map(|n| n as u8);
         let mut expected = (0..5_000u32).map(|n| n as u8);
@@ -306,9 +306,9 @@ mod tests {
     }
 
     #[test]
-    fn the_interrupt_is_off_from_a_full_ring_to_a_half_empty_one() {
+    fn the_interrupt_is_off_until_a_full_ring_is_half_empty() {
         let receiver = Receiver::<16>::new();
-        let mut uart = Model::on();
+        let mut uart = SimulatedUart::on();
         for byte in 0..16 {
             uart.arrive(byte, 0);
             receiver.take(&mut uart);
@@ -326,9 +326,9 @@ mod tests {
     }
 
     #[test]
-    fn a_byte_is_announced_and_a_busy_transmitter_is_waited_for() {
+    fn a_waiting_byte_and_a_busy_transmitter_are_reported() {
         let receiver = Receiver::<16>::new();
-        let mut uart = Model::on();
+        let mut uart = SimulatedUart::on();
         for busy in [true, false] {
             uart.busy = busy;
             uart.arrive(7, 0);
@@ -342,13 +342,13 @@ mod tests {
 
     /// Whichever bytes a UART loses, no line that misses one of them is accepted.
     #[test]
-    fn a_line_with_a_lost_byte_is_refused_by_name() {
+    fn a_line_with_a_lost_byte_is_refused() {
         let mut random = seeded::generator();
         let mut refused = 0;
         for _ in 0..300 {
             let receiver = Receiver::<64>::new();
-            let mut uart = Model::on();
-            let (mut lines, mut heard) = (Lines::new(), Vec::new());
+            let mut uart = SimulatedUart::on();
+            let (mut lines, mut received_lines) = (Lines::new(), Vec::new());
             let mut sent = Vec::new();
             let mut lost = false;
             for number in 0..40 {
@@ -364,20 +364,20 @@ mod tests {
                     if random.u8(..40) == 0 {
                         // Sending reads Line Status too.
                         assert!(receiver.can_send(&mut uart));
-                        fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
+                        fetch_all(&receiver, &mut uart, &mut lines, &mut received_lines);
                     }
                 }
                 sent.push(line);
             }
             let mut rest = sent.iter();
-            for line in &heard {
+            for line in &received_lines {
                 match line {
                     // Accepted lines are complete and in order.
                     Ok(line) => assert!(rest.any(|sent| sent == line), "'{line}' was not sent"),
-                    Err(why) => {
+                    Err(error) => {
                         assert_eq!(
-                            why,
-                            "a line with bytes that were lost or damaged on the wire"
+                            error,
+                            "bytes of the line were lost or damaged on the wire; send the line again"
                         );
                         refused += 1;
                     }
@@ -385,18 +385,18 @@ mod tests {
             }
             if receiver.overruns() == 0 && uart.overrun == 0 {
                 assert!(!lost);
-                assert!(heard.iter().all(Result::is_ok));
+                assert!(received_lines.iter().all(Result::is_ok));
             }
         }
         assert!(refused > 100, "{refused}");
     }
 
     #[test]
-    fn a_damaged_byte_costs_its_line_whoever_reads_the_status() {
+    fn a_line_with_a_damaged_byte_is_refused_whoever_reads_the_status() {
         for sender_reads_first in [false, true] {
             for error in [0x04, 0x08, 0x10] {
                 let receiver = Receiver::<64>::new();
-                let mut uart = Model::on();
+                let mut uart = SimulatedUart::on();
                 for &byte in b"one\ntwo\nthree\n" {
                     uart.arrive(byte, if byte == b'w' { error } else { 0 });
                     if sender_reads_first {
@@ -404,36 +404,37 @@ mod tests {
                     }
                     receiver.take(&mut uart);
                 }
-                let (mut lines, mut heard) = (Lines::new(), Vec::new());
-                fetch_all(&receiver, &mut uart, &mut lines, &mut heard);
-                let lost = "a line with bytes that were lost or damaged on the wire";
+                let (mut lines, mut received_lines) = (Lines::new(), Vec::new());
+                fetch_all(&receiver, &mut uart, &mut lines, &mut received_lines);
+                let lost =
+                    "bytes of the line were lost or damaged on the wire; send the line again";
                 let expected = [Ok("one"), Err(lost), Ok("three")];
-                let heard: Vec<_> = heard
+                let received_lines: Vec<_> = received_lines
                     .iter()
                     .map(|line| line.as_deref().map_err(String::as_str))
                     .collect();
-                assert_eq!(heard, expected);
+                assert_eq!(received_lines, expected);
                 assert_eq!((receiver.damaged(), receiver.overruns()), (1, 0));
             }
         }
     }
 
     #[test]
-    fn a_port_with_nothing_behind_it_gives_nothing() {
-        struct Nothing;
-        impl Uart for Nothing {
+    fn a_port_without_a_device_gives_no_bytes() {
+        struct NoDevice;
+        impl Uart for NoDevice {
             fn line_status(&mut self) -> u8 {
                 NOTHING
             }
             fn data(&mut self) -> u8 {
-                unreachable!("it has no byte")
+                unreachable!("the port has no byte")
             }
             fn set_interrupt(&mut self, _: bool) {
                 unreachable!("the ring is empty")
             }
         }
         let receiver = Receiver::<16>::new();
-        receiver.take(&mut Nothing);
+        receiver.take(&mut NoDevice);
         assert!(!receiver.has_received());
         assert_eq!((receiver.overruns(), receiver.damaged()), (0, 0));
     }

@@ -84,7 +84,7 @@ mod tests {
     use std::sync::Arc;
 
     #[test]
-    fn any_order_of_calls_gives_what_a_queue_gives() {
+    fn any_order_of_calls_gives_the_items_of_a_queue() {
         let mut random = seeded::generator();
         let ring = Ring::<8>::new();
         // The counters wrap during the test.

@@ -27,7 +27,7 @@ pub fn panic(info: &PanicInfo<'_>) -> ! {
 /// Reports that the display adapter does not support Mode X, and ends the machine.
 pub fn adapter(error: SetError) -> ! {
     report(Exit::Adapter, |out| {
-        out.line(format_args!("{ADAPTER} does not take Mode X: {error}"));
+        out.line(format_args!("{ADAPTER} does not support Mode X: {error}"));
     })
 }
 
@@ -57,11 +57,11 @@ pub(super) fn exception(name: &str, frame: &Frame) -> ! {
     })
 }
 
-fn report(exit: Exit, words: impl FnOnce(&mut Unlocked)) -> ! {
+fn report(exit: Exit, write: impl FnOnce(&mut Unlocked)) -> ! {
     x86_64::instructions::interrupts::disable();
     if !REPORTING.swap(true, Ordering::Relaxed) {
         let mut out = Unlocked::take_over();
-        words(&mut out);
+        write(&mut out);
         out.line(format_args!("{END_OF_REPORT}"));
         out.wait_for_host();
     }

@@ -10,22 +10,22 @@ use super::ports;
 /// accesses and never as a slice: a compiler that saw plain stores would merge or drop stores that differ
 /// only in the port writes between them.
 #[derive(Debug)]
-pub struct Window {
+pub struct HardwareVga {
     base: NonNull<u8>,
 }
 
-impl Window {
-    /// Returns the window that is mapped at `base`.
+impl HardwareVga {
+    /// Returns the card whose window is mapped at `base`.
     ///
     /// # Safety
-    /// `base..base + 64 KiB` is the card's window for the life of the value, and nothing else reaches the
+    /// `base..base + 64 KiB` is the card's window for the life of the value, and no other code accesses the
     /// window or the card's ports.
     pub unsafe fn new(base: NonNull<u8>) -> Self {
         Self { base }
     }
 }
 
-impl Bus for Window {
+impl Bus for HardwareVga {
     fn out8(&mut self, port: u16, value: u8) {
         // SAFETY: the VGA's ports change what is shown and where stores go, never RAM.
         unsafe { ports::out8(port, value) }
