@@ -55,7 +55,7 @@ pub fn init(boot_info: &'static mut BootInfo) -> Machine {
     let offset = boot_info
         .physical_memory_offset
         .into_option()
-        .expect("the boot loader was asked to map the physical memory");
+        .expect("the boot loader maps the physical memory, as BOOT requests");
     let base = NonNull::new((offset + WINDOW) as *mut u8).expect("the window is not at zero");
     // SAFETY: the boot loader maps all physical memory at `offset`, including the card's window, for as long
     // as the kernel runs. No other pointer to the window is made.

@@ -25,7 +25,7 @@ const DAMAGED: u8 = 0x1C;
 const TRANSMITTER_READY: u8 = 0x20;
 /// The value that a port without a device reads. A UART sets bit 7 only with a FIFO error, and never sets all
 /// bits.
-const NOTHING: u8 = 0xFF;
+const NO_DEVICE: u8 = 0xFF;
 /// Bytes that the receiver's FIFO holds.
 const FIFO: u8 = 16;
 /// Set in a ring's item if the byte is damaged.
@@ -79,11 +79,11 @@ impl<const SIZE: usize> Receiver<SIZE> {
     /// The interrupt handler's part: moves bytes from the FIFO into the ring, until the FIFO is empty or the
     /// ring is full. It must go that far, because the interrupt controller sees only the edge at which the
     /// UART's request begins.
-    pub fn take(&self, uart: &mut impl Uart) {
+    pub fn handle_interrupt(&self, uart: &mut impl Uart) {
         // Check for a full ring first: reading Line Status clears the errors of the next byte.
         while !self.ring.is_full() {
             let status = uart.line_status();
-            if status == NOTHING {
+            if status == NO_DEVICE {
                 return;
             }
             self.count_errors(status);
@@ -257,11 +257,11 @@ mod tests {
         for &byte in bytes.iter().chain(b"\r") {
             uart.arrive(byte, 0);
             if uart.requests() {
-                receiver.take(&mut uart);
+                receiver.handle_interrupt(&mut uart);
             }
         }
         // The FIFO's time-out delivers the rest.
-        receiver.take(&mut uart);
+        receiver.handle_interrupt(&mut uart);
         let (mut lines, mut received_lines) = (Lines::new(), Vec::new());
         fetch_all(&receiver, &mut uart, &mut lines, &mut received_lines);
         let expected: Vec<_> = sent.into_iter().map(Ok).collect();
@@ -285,11 +285,11 @@ mod tests {
             {
                 uart.arrive(byte, 0);
                 if uart.requests() {
-                    receiver.take(&mut uart);
+                    receiver.handle_interrupt(&mut uart);
                 }
             }
             if round % 3 == 0 && uart.on {
-                receiver.take(&mut uart);
+                receiver.handle_interrupt(&mut uart);
             }
             for _ in 0..round % 7 {
                 if let Some(received) = receiver.fetch(&mut uart) {
@@ -311,7 +311,7 @@ mod tests {
         let mut uart = SimulatedUart::on();
         for byte in 0..16 {
             uart.arrive(byte, 0);
-            receiver.take(&mut uart);
+            receiver.handle_interrupt(&mut uart);
             assert_eq!(uart.on, byte < 15, "after {byte}");
         }
         for byte in 0..16 {
@@ -334,7 +334,7 @@ mod tests {
             uart.arrive(7, 0);
             assert_eq!(receiver.can_send(&mut uart), !busy);
             assert!(!receiver.has_received());
-            receiver.take(&mut uart);
+            receiver.handle_interrupt(&mut uart);
             assert!(receiver.has_received());
             assert!(receiver.fetch(&mut uart).is_some());
         }
@@ -359,7 +359,7 @@ mod tests {
                     lost |= uart.overrun != 0;
                     // The handler runs late, and the program later still.
                     if random.u8(..12) == 0 {
-                        receiver.take(&mut uart);
+                        receiver.handle_interrupt(&mut uart);
                     }
                     if random.u8(..40) == 0 {
                         // Sending reads Line Status too.
@@ -402,7 +402,7 @@ mod tests {
                     if sender_reads_first {
                         receiver.can_send(&mut uart);
                     }
-                    receiver.take(&mut uart);
+                    receiver.handle_interrupt(&mut uart);
                 }
                 let (mut lines, mut received_lines) = (Lines::new(), Vec::new());
                 fetch_all(&receiver, &mut uart, &mut lines, &mut received_lines);
@@ -424,7 +424,7 @@ mod tests {
         struct NoDevice;
         impl Uart for NoDevice {
             fn line_status(&mut self) -> u8 {
-                NOTHING
+                NO_DEVICE
             }
             fn data(&mut self) -> u8 {
                 unreachable!("the port has no byte")
@@ -434,7 +434,7 @@ mod tests {
             }
         }
         let receiver = Receiver::<16>::new();
-        receiver.take(&mut NoDevice);
+        receiver.handle_interrupt(&mut NoDevice);
         assert!(!receiver.has_received());
         assert_eq!((receiver.overruns(), receiver.damaged()), (0, 0));
     }

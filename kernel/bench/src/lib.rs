@@ -7,8 +7,8 @@
 //!
 //! # The protocol
 //!
-//! As in [`protocol`]: lines have checksums, and the last line of an answer is `ok` with the request, or `error`.
-//! The kernel sends nothing during a measurement.
+//! As in [`protocol`]: lines have checksums, and the last line of an answer is `ok` with the request, or
+//! `error`. The kernel sends nothing during a measurement.
 //!
 //! | line | answer, before `ok` |
 //! | --- | --- |

@@ -15,8 +15,8 @@ use expect_test::expect_file;
 use protocol::Reception;
 use vga::Vga;
 
-/// The session's steps. `tick N` shows the running demo's frame of a tick, if it is due; `frame-time N`
-/// sets how many microseconds the frame needed; `key` sends scan codes; `lose` sets losses of the keyboard and the
+/// The session's steps. `tick N` shows the running demo's frame of a tick, if it is due; `frame-time N` sets
+/// how many microseconds the frame needed; `key` sends scan codes; `lose` sets losses of the keyboard and the
 /// serial line; `#` begins a comment; everything else is a command.
 const SESSION: &str = include_str!("session.txt");
 

@@ -30,9 +30,9 @@
 //!
 //! [`ModelFile::parse`] trusts nothing, because the bytes may come from anywhere. The checksum finds any
 //! accidental change. But a model file can be forged with a matching checksum, so every count, index and
-//! range is also checked. A scene made of an accepted model file is within every limit of the renderer and the
-//! mappers, and cannot make them panic. Whether the scene looks good is not checked: faces may be bent, inside
-//! out or invisible.
+//! range is also checked. A scene made of an accepted model file is within every limit of the renderer and
+//! the mappers, and cannot make them panic. Whether the scene looks good is not checked: faces may be bent,
+//! inside out or invisible.
 //!
 //! # Example
 //!
@@ -157,9 +157,9 @@ impl Parts<'_> {
         }
     }
 
-    /// Writes the model file in pieces, and returns its checksum. Values beyond a limit are written as they are;
-    /// [`ModelFile::parse`] refuses them. The faces use the corners one after the other, and all faces use the one
-    /// texture; their `first` and `texture` are ignored.
+    /// Writes the model file in pieces, and returns its checksum. Values beyond a limit are written as they
+    /// are; [`ModelFile::parse`] refuses them. The faces use the corners one after the other, and all faces
+    /// use the one texture; their `first` and `texture` are ignored.
     pub fn write(&self, mut sink: impl FnMut(&[u8])) -> u32 {
         let Mesh {
             vertices,
@@ -233,7 +233,8 @@ impl<'p> ModelFile<'p> {
         if bytes.len() > MAX_BYTES {
             return Err(ModelError::TooLong(bytes.len()));
         }
-        // Check the magic first: bytes of another kind are reported as no model file, not as a short model file.
+        // Check the magic first: bytes of another kind are reported as no model file, not as a short model
+        // file.
         if !bytes.starts_with(&MAGIC) {
             return Err(ModelError::NotAModelFile);
         }
@@ -395,7 +396,8 @@ fn corner(bytes: &[u8; CORNER]) -> Corner {
     }
 }
 
-/// Returns a face whose first corner is `first`, which is at most [`MAX_ALL_CORNERS`] in an accepted model file.
+/// Returns a face whose first corner is `first`, which is at most [`MAX_ALL_CORNERS`] in an accepted model
+/// file.
 fn face_at(bytes: &[u8; FACE], first: usize) -> Face {
     let (words, _) = bytes.as_chunks();
     Face {

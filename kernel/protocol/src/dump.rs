@@ -23,16 +23,16 @@
 //! a line of a page is a line of the dump. Pixel i of a line is in plane i & 3 at the line's address plus i /
 //! 4; the last line has the sixteen addresses that remain.
 //!
-//! The model file is `none` for a built-in scene. Otherwise it is the checksum, in eight hex digits, of the model file
-//! that contains the model. Dumps with different model files show different models, even though their scenes have
-//! the same name.
+//! The model file is `none` for a built-in scene. Otherwise it is the checksum, in eight hex digits, of the
+//! model file that contains the model. Dumps with different model files show different models, even though
+//! their scenes have the same name.
 //!
 //! The header names the frame so that `scene`, `mapper` and `show` draw it again. If some of its faces were
 //! drawn in reduced quality, `motion` is the [`Motion`] that decided which; otherwise it is `none`. Before
 //! the first frame `mapper`, `frame` and `motion` are `none`.
 //!
-//! Version 4 had the words `pack` and `picture` for `model` and `frame`. Version 3 also had no line `motion`, and
-//! marked reduced quality by a `~` behind the mapper's name.
+//! Version 4 had the words `pack` and `picture` for `model` and `frame`. Version 3 also had no line `motion`,
+//! and marked reduced quality by a `~` behind the mapper's name.
 //!
 //! Two dumps of the same frame on different pages differ only in their `start`.
 

@@ -22,7 +22,7 @@
 //!
 //! The host sends one [`Command`] a line. The host may end the line in a checksum too, and the kernel then
 //! checks it. The kernel answers with any number of lines. The last line begins with `ok` and repeats the
-//! command, or begins with `error` and gives the reason:
+//! command, or begins with `error` and says what is wrong:
 //!
 //! | command | answer, before `ok` |
 //! | --- | --- |
@@ -46,11 +46,11 @@
 //! | `leave` | no lines; QEMU ends after the `ok` |
 //!
 //! Commands that arrive during an answer are answered after it, in order. The kernel waits for a host that
-//! does not read. Between answers the kernel also sends lines unasked:
+//! does not read. Between answers the kernel also sends these lines:
 //!
 //! - `hello crystal-ball VERSION protocol 7`: the boot loader has started the kernel;
-//! - `loaded model 1a2b3c4d`, with the model file's checksum, or `refused model: ...`, with the reason: right after
-//!   `hello`, if the boot loader has loaded a ramdisk;
+//! - `loaded model 1a2b3c4d`, with the model file's checksum, or `refused model: ...`, with the reason: right
+//!   after `hello`, if the boot loader has loaded a ramdisk;
 //! - `running`: the first frame is on the screen;
 //! - `panic ...`, `exception ...`, `adapter ...`, and lines with details, then [`END_OF_REPORT`].
 //!

@@ -180,11 +180,11 @@ extern "C" fn dispatch(frame: &Frame) {
             end_of_interrupt(IRQ_TIMER);
         }
         IRQ_KEYBOARD => {
-            keyboard::take();
+            keyboard::handle_interrupt();
             end_of_interrupt(IRQ_KEYBOARD);
         }
         IRQ_SERIAL => {
-            serial::take();
+            serial::handle_interrupt();
             end_of_interrupt(IRQ_SERIAL);
         }
         IRQ_SPURIOUS => {}

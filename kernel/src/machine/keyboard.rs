@@ -22,7 +22,7 @@ const INPUT_FULL: u8 = 0x02;
 /// Status: the waiting byte is the mouse's.
 const FROM_MOUSE: u8 = 0x20;
 /// The value that a port without a device reads.
-const NOTHING: u8 = 0xFF;
+const NO_DEVICE: u8 = 0xFF;
 
 const READ_CONFIGURATION: u8 = 0x20;
 const WRITE_CONFIGURATION: u8 = 0x60;
@@ -54,7 +54,7 @@ static LOST: AtomicU32 = AtomicU32::new(0);
 /// Called with interrupts off and the keyboard's interrupt not masked. A code that arrived earlier would keep
 /// the request up, and no later request would be seen.
 pub fn init() {
-    if status() == NOTHING {
+    if status() == NO_DEVICE {
         return;
     }
     command(DISABLE_KEYBOARD);
@@ -92,10 +92,10 @@ pub fn lost() -> u32 {
 
 /// The interrupt handler's part: fetches what the controller has. It fetches everything, because the request
 /// is an edge, but no more than the ring holds, in case the port reads nonsense.
-pub(super) fn take() {
+pub(super) fn handle_interrupt() {
     for _ in 0..RING {
         let status = status();
-        if status & OUTPUT_FULL == 0 || status == NOTHING {
+        if status & OUTPUT_FULL == 0 || status == NO_DEVICE {
             return;
         }
         let code = read();

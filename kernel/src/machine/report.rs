@@ -44,8 +44,8 @@ pub(super) fn exception(name: &str, frame: &Frame) -> ! {
             frame.rip, frame.cs, frame.rflags, frame.rsp, frame.ss
         ));
         for registers in frame.general().chunks(4) {
-            let show = |i: usize| registers.get(i).copied().unwrap_or(("", 0));
-            let [(a, av), (b, bv), (c, cv), (d, dv)] = [0, 1, 2, 3].map(show);
+            let register = |i: usize| registers.get(i).copied().unwrap_or(("", 0));
+            let [(a, av), (b, bv), (c, cv), (d, dv)] = [0, 1, 2, 3].map(register);
             if d.is_empty() {
                 out.line(format_args!("{a} {av:016x}  {b} {bv:016x}  {c} {cv:016x}"));
             } else {

@@ -134,8 +134,8 @@ pub fn reception() -> Reception {
 }
 
 /// The interrupt handler's part: moves received bytes into the ring.
-pub(super) fn take() {
-    RECEIVER.take(&mut Com1);
+pub(super) fn handle_interrupt() {
+    RECEIVER.handle_interrupt(&mut Com1);
 }
 
 fn port() -> Option<Uart16550<PioBackend>> {
@@ -144,7 +144,7 @@ fn port() -> Option<Uart16550<PioBackend>> {
 }
 
 /// A writer for reports of a panic or an exception. It bypasses the lock, which the code that failed may
-/// hold, and waits for the host no longer than `PATIENCE` in all.
+/// hold, and waits for the host no longer than `HOST_TIMEOUT` in all.
 #[derive(Debug)]
 pub struct Unlocked {
     clock: timer::Countdown,
@@ -152,13 +152,13 @@ pub struct Unlocked {
 
 /// Timer periods that a whole report may wait for the host: 5 s of ticks, and 16 s if the failure came before
 /// the timer was set.
-const PATIENCE: u32 = 5 * TICKS_PER_SECOND;
+const HOST_TIMEOUT: u32 = 5 * TICKS_PER_SECOND;
 
 impl Unlocked {
     /// Takes over the port, and cancels a line that the lock's holder may have begun.
     pub fn take_over() -> Self {
         let mut this = Self {
-            clock: timer::Countdown::new(PATIENCE),
+            clock: timer::Countdown::new(HOST_TIMEOUT),
         };
         this.send(&[CANCEL]);
         this
@@ -186,7 +186,7 @@ impl Unlocked {
         }
     }
 
-    /// Waits for `status`. Returns false if `PATIENCE` ran out first.
+    /// Waits for `status`. Returns false if `HOST_TIMEOUT` ran out first.
     fn wait(&mut self, status: u8) -> bool {
         loop {
             if Com1.line_status() & status != 0 {
