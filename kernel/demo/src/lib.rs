@@ -51,6 +51,7 @@ mod palette;
 mod presentation;
 mod split;
 mod steering;
+mod text;
 mod trajectory;
 
 use core::fmt;
@@ -65,10 +66,11 @@ pub use frame::pose;
 use keys::Keyboard;
 pub use keys::{KEYS, Key};
 use log::{Log, LogMemory};
-use overlay::{FrameStatistics, Overlay, TextLayer};
+use overlay::{FrameStatistics, Overlay};
 use presentation::Presentation;
 pub use split::HEAT;
 use steering::{Scenes, State, StateChange};
+use text::TextLayer;
 
 /// The program's version, as the kernel's first line and `version` print it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
