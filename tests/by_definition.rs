@@ -10,8 +10,9 @@ use oracle::coverage::inside;
 use oracle::depth;
 use oracle::solid::{self, Checker, Compared, Solid};
 use oracle::texel::{affine, perspective};
+use render::{Stage, Storage};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
-use scene::{FOCAL_LENGTH, Pose, Stage, Storage};
+use scene::{FOCAL_LENGTH, Pose};
 use texmap::loops::Loop;
 use texmap::{Face, Mapper, Point, Texture};
 

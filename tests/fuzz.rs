@@ -18,8 +18,9 @@ use import::{Model, obj, solid, texture};
 use in_place::InPlace;
 use model::{Arena, MAX_BYTES, ModelFile, Parts};
 use modex::PlanarBuffer;
+use render::{Stage, Storage};
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
-use scene::{MAX_EXTENT, Mesh, Pose, Stage, Storage};
+use scene::{MAX_EXTENT, Mesh, Pose};
 use texmap::{Mapper, Texture};
 
 /// The offset of a model file's counts, after magic, version, length and checksum.

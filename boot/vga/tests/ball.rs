@@ -2,7 +2,8 @@
 
 use modex::registers::{CRTC, MAP_MASK, MODE_X, SEQUENCER, START_ADDRESS_HIGH};
 use modex::{Counted, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Purpose, WIDTH};
-use scene::{Pose, Stage, Storage};
+use render::{Stage, Storage};
+use scene::Pose;
 use vga::Vga;
 
 #[test]

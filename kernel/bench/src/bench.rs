@@ -5,7 +5,8 @@ use core::hint::black_box;
 
 use modex::{Bus, Destination, HEIGHT, ModeX, Offscreen, PlanarBuffer, SetError, WIDTH};
 use protocol::{Checksum, ERROR, Lines, OK};
-use scene::{Pose, Stage, Storage};
+use render::{Stage, Storage};
+use scene::Pose;
 use texmap::{Job, JobList, Mapper, Order, Stats, Texture};
 
 use crate::line::{Ask, Figure};

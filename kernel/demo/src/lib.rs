@@ -28,8 +28,9 @@ use protocol::{
     Action, Change, Command, Content, ERROR, Fault, FrameName, Lines, Motion, OK, PROTOCOL,
     RUNNING, Reception, Setting, Word,
 };
+use render::{Stage, Storage};
+use scene::Pose;
 use scene::catalogue::{Entry, MAX_TEXELS};
-use scene::{Pose, Stage, Storage};
 use texmap::{Mapper, Order, Stats};
 
 use keys::Keyboard;

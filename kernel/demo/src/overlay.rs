@@ -13,8 +13,8 @@ use core::fmt::{self, Write};
 
 use modex::{Destination, HEIGHT, Palette, WIDTH};
 use protocol::{Action, TICKS_PER_SECOND};
+use render::motion::Motion;
 use scene::font;
-use scene::motion::Motion;
 use texmap::{Mapper, Order};
 
 use crate::palette::nearest;

@@ -10,7 +10,8 @@
 use core::ops::Range;
 
 use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH, Window};
-use scene::{Pose, Stage};
+use render::Stage;
+use scene::Pose;
 use texmap::{Mapper, Stats};
 
 use crate::palette::nearest;

@@ -30,7 +30,7 @@
 //!
 //! [`ModelFile::parse`] trusts nothing, because the bytes may come from anywhere. The checksum finds any
 //! accidental change. But a model file can be forged with a matching checksum, so every count, index and range is
-//! also checked. A scene made of an accepted model file is within every limit of [`scene::Stage`] and the mappers,
+//! also checked. A scene made of an accepted model file is within every limit of the scene renderer and the mappers,
 //! and can make none of them panic. Whether the scene looks good is not checked: faces may be bent, inside
 //! out or invisible.
 #![no_std]
@@ -381,7 +381,8 @@ mod tests {
     extern crate std;
     use super::*;
     use modex::PlanarBuffer;
-    use scene::{Pose, Stage, Storage};
+    use render::{Stage, Storage};
+    use scene::Pose;
     use std::boxed::Box;
     use std::string::ToString;
     use std::vec::Vec;

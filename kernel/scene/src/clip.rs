@@ -45,7 +45,7 @@ use crate::camera::{FOCAL_LENGTH, NEAR, project, project_fine};
 use crate::{Corner, Vec3};
 
 /// Number of clip planes.
-pub(crate) const PLANES: usize = 5;
+pub const PLANES: usize = 5;
 
 /// Fraction bits of a corner beyond the 16 of a vertex.
 const FINE: u32 = 28;
@@ -81,7 +81,7 @@ static CLIPS: [Plane; PLANES] = {
 
 /// A vertex of the mesh in view space, shared by all faces that meet in it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Point {
+pub struct Point {
     /// In view space, 16.16.
     view: Vec3,
     /// On the screen in 1/256 pixel, if the vertex is inside all planes.
@@ -202,7 +202,7 @@ fn crossing(inside: &Placed, outside: &Placed, above: i128, below: i128) -> Plac
 
 /// Projects a face to the screen, clipped if necessary, and returns how many vertices of `polygon` it uses:
 /// fewer than 3 if nothing is visible. Returns `None` if the face needs more than [`MAX_SIDES`] vertices.
-pub(crate) fn place(
+pub fn place(
     corners: &[Corner],
     points: &[Point],
     polygon: &mut [Vertex; MAX_SIDES],

@@ -4,6 +4,10 @@ use texmap::MAX_SIDES;
 
 use crate::clip::PLANES;
 
+/// Most vertices of a mesh.
+pub const MAX_VERTICES: usize = 4096;
+/// Most faces of a mesh that is not convex. Such a mesh's faces keep their numbers until the frame is drawn.
+pub const MAX_FACES: usize = 8192;
 /// Most corners of a face. Clipping may add a corner at each of five planes, and the result must still be a
 /// polygon of at most [`MAX_SIDES`] sides.
 pub const MAX_CORNERS: usize = MAX_SIDES - PLANES;
@@ -51,6 +55,6 @@ pub struct Mesh<'a> {
     /// Faces.
     pub faces: &'a [Face],
     /// Whether no front face can hide a part of another, as in a convex solid or a single face. A mesh that
-    /// is not convex has at most [`MAX_FACES`](crate::MAX_FACES) faces.
+    /// is not convex has at most [`MAX_FACES`] faces.
     pub convex: bool,
 }

@@ -10,7 +10,8 @@ use std::ops::Range;
 
 use fastrand::Rng;
 use modex::{HEIGHT, WIDTH};
-use scene::{FOCAL_LENGTH, Pose, Stage, Storage, Vec3};
+use render::{Stage, Storage};
+use scene::{FOCAL_LENGTH, Pose, Vec3};
 use texmap::{Face, Mapper, Order, Point};
 
 use crate::coverage::{Area, Pixels};

@@ -8,10 +8,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use fastrand::Rng;
 use in_place::InPlace;
 use modex::{Destination, HEIGHT, Lane, Palette, PlanarBuffer, STRIDE, WIDTH};
-use scene::{
-    Corner, FOCAL_LENGTH, Face, LIGHT_LEVELS, LightTable, Mesh, NEAR, Pose, Scene, Stage, Storage,
-    Vec3,
-};
+use render::{Stage, Storage};
+use scene::{Corner, FOCAL_LENGTH, Face, LIGHT_LEVELS, LightTable, Mesh, NEAR, Pose, Scene, Vec3};
 use texmap::{MAX_COORDINATE, Point, Stats, Texture};
 
 use crate::coverage::{Area, Pixels, Row, inside};

@@ -1,7 +1,8 @@
 //! The subjects that mappers are measured on: scenes at several poses, and random polygons.
 
+use render::{Stage, Storage};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
-use scene::{Corner, FOCAL_LENGTH, Face as MeshFace, Mesh, Pose, Scene, Stage, Storage, Vec3};
+use scene::{Corner, FOCAL_LENGTH, Face as MeshFace, Mesh, Pose, Scene, Vec3};
 use texmap::plane::Anchor;
 use texmap::{Face, Texture, Vertex};
 

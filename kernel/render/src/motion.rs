@@ -35,10 +35,11 @@ use texmap::coverage::{Axis, spans};
 use texmap::plane::{Anchor, Plane, coordinate};
 use texmap::{Face, Mapper, Texture};
 
-use super::{Stage, lit, polygons};
-use crate::pose::Orientation;
-use crate::trig::sin;
-use crate::{FOCAL_LENGTH, Pose, Vec3};
+use scene::trig::sin;
+use scene::{FOCAL_LENGTH, Orientation, Pose, Vec3};
+
+use crate::Stage;
+use crate::renderer::{lit, polygons};
 
 /// Images a second that the eye still sees one by one, not as motion. (P. Read and M.-P. Meyer, Restoration
 /// of Motion FrameName Film, 2000: 10 to 12.)
@@ -70,7 +71,7 @@ impl Motion {
 
 /// The motion from one pose of the solid to another.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Move {
+pub(crate) struct Move {
     from: (Orientation, i32),
     to: (Orientation, i32),
 }
@@ -132,7 +133,7 @@ impl Move {
 
 /// Chooses the mapper of each face.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Quality {
+pub(crate) struct Quality {
     mapper: Mapper,
     /// The faster mapper, and the motion that hides its errors.
     lower: Option<(Mapper, Move)>,
@@ -160,7 +161,7 @@ impl Quality {
 
 /// Half the period of a texture's root mean square frequency, 16.16 texels, at least 1. Returns `None` for a
 /// texture of one colour.
-pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u32> {
+pub(crate) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u32> {
     let sides = texture
         .tile()
         .unwrap_or((texture.width(), texture.height()));
@@ -290,7 +291,7 @@ mod tests {
     extern crate std;
     use super::*;
     use crate::Storage;
-    use crate::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+    use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
     use std::boxed::Box;
     use std::vec::Vec;
 

@@ -6,9 +6,11 @@ use modex::{Destination, HEIGHT};
 use texmap::Job;
 use texmap::plane::coordinate;
 
-use super::motion::Quality;
-use super::{Stage, lit, polygons};
-use crate::Pose;
+use scene::Pose;
+
+use crate::Stage;
+use crate::motion::Quality;
+use crate::renderer::{lit, polygons};
 
 impl Stage<'_> {
     /// Draws the solid as [`Stage::draw`] does, but colours each pixel by the mapper's error there: the
@@ -114,9 +116,10 @@ impl Run {
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use crate::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
-    use crate::{Pose, Stage, Storage};
+    use crate::{Stage, Storage};
     use modex::{PlanarBuffer, WIDTH};
+    use scene::Pose;
+    use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
     use std::boxed::Box;
     use texmap::Mapper;
 

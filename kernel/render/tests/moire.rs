@@ -8,8 +8,9 @@
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::depth::nearest;
+use render::{Stage, Storage};
+use scene::Pose;
 use scene::catalogue::{Entry, MAX_TEXELS};
-use scene::{Pose, Stage, Storage};
 use texmap::plane::Form;
 use texmap::{Mapper, Plane};
 

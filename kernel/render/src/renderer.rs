@@ -1,21 +1,17 @@
 //! The scene renderer: prepares a scene's textures, and turns a pose into polygons.
 
-mod errors;
-pub mod motion;
-
 use modex::{Destination, HEIGHT, Palette};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex, Visible};
 
-use self::motion::Quality;
-use crate::clip::{Point, place};
-use crate::colour::{LIGHT_LEVELS, LightTable, MATERIALS, lit_level};
-use crate::{FOCAL_LENGTH, MAX_CORNERS, MAX_EXTENT, Mesh, Pose};
+use scene::clip::{Point, place};
+use scene::{
+    FOCAL_LENGTH, LIGHT_LEVELS, MATERIALS, MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh,
+    Pose, Scene, lit_level,
+};
 
-/// Most vertices of a mesh.
-pub const MAX_VERTICES: usize = 4096;
-/// Most faces of a mesh that is not convex. Such a mesh's faces keep their numbers until the frame is drawn.
-pub const MAX_FACES: usize = 8192;
+use crate::motion::{self, Quality};
+
 /// Most jobs that are collected before they are drawn.
 pub const MAX_JOBS: usize = 4096;
 /// Room for a scene's textures, padded, with a copy for each light level: one texture of the largest size.
@@ -24,29 +20,6 @@ pub const SURFACE_BYTES: usize = 3 << 19;
 const MAX_TEXTURES: usize = 16;
 /// Mipmaps of a texture: the texture itself, and copies down to 1/64 of its sides.
 const MIPMAPS: usize = 7;
-
-/// A mesh with its textures, colours and background.
-///
-/// `'t` is the textures' lifetime. A stage makes its own lit copies, so the textures need not outlive
-/// [`Stage::set`].
-#[derive(Clone, Copy, Debug)]
-pub struct Scene<'a, 't> {
-    /// Name, for people.
-    pub name: &'static str,
-    /// The solid, about the origin.
-    pub mesh: Mesh<'a>,
-    /// Textures in full light.
-    pub textures: &'t [Texture<'t>],
-    /// The DAC's colours.
-    pub palette: &'a Palette,
-    /// The colour that each colour becomes at each light level.
-    pub light: &'t LightTable,
-    /// The colour of each scan line where no solid covers it.
-    pub background: &'a [u8; HEIGHT],
-    /// Whether the textures need smaller copies for distant faces. If so, the sides of the textures, or of
-    /// their tiles, are powers of two.
-    pub mipmaps: bool,
-}
 
 /// Fixed arenas for drawing.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +50,7 @@ impl Default for Storage {
 
 /// The place of a texture's lit copies: one copy for each light level, one after the other.
 #[derive(Clone, Copy, Debug, Default)]
-struct Surface {
+pub(crate) struct Surface {
     first: usize,
     width: u16,
     height: u16,
@@ -129,23 +102,23 @@ impl Surface {
 #[derive(Debug)]
 pub struct Stage<'a> {
     name: &'static str,
-    mesh: Mesh<'a>,
+    pub(crate) mesh: Mesh<'a>,
     palette: &'a Palette,
     background: &'a [u8; HEIGHT],
     /// Mipmaps of each texture of the scene.
-    mipmaps: usize,
-    mapper: Mapper,
+    pub(crate) mipmaps: usize,
+    pub(crate) mapper: Mapper,
     order: Order,
     /// The pose one tick later, if quality is reduced in motion; and how many faces of the last frame were
     /// drawn in reduced quality.
-    next: Option<Pose>,
+    pub(crate) next: Option<Pose>,
     lowered: u32,
     /// Half the shortest period of the textures, 16.16 texels.
-    half_period: Option<u32>,
-    surfaces: [Surface; MAX_TEXTURES],
-    texels: &'a mut [u8; SURFACE_BYTES],
-    points: &'a mut [Point; MAX_VERTICES],
-    visible: &'a mut Visible<MAX_FACES>,
+    pub(crate) half_period: Option<u32>,
+    pub(crate) surfaces: [Surface; MAX_TEXTURES],
+    pub(crate) texels: &'a mut [u8; SURFACE_BYTES],
+    pub(crate) points: &'a mut [Point; MAX_VERTICES],
+    pub(crate) visible: &'a mut Visible<MAX_FACES>,
     jobs: &'a mut JobList<MAX_JOBS>,
 }
 
@@ -401,7 +374,7 @@ impl<'a> Stage<'a> {
 }
 
 /// A texture in the light of a face.
-fn lit<'t>(
+pub(crate) fn lit<'t>(
     surfaces: &[Surface; MAX_TEXTURES],
     texels: &'t [u8; SURFACE_BYTES],
     number: u16,
@@ -411,7 +384,7 @@ fn lit<'t>(
 }
 
 /// Passes the front faces to `sink` in the mesh's order, each with its number in the mesh.
-fn polygons(
+pub(crate) fn polygons(
     mesh: &Mesh<'_>,
     mipmaps: usize,
     points: &mut [Point; MAX_VERTICES],

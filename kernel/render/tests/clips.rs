@@ -3,7 +3,8 @@
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::solid::{Checker, Compared, Count, Mix, Solid, length, pose};
-use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Storage, Vec3};
+use render::Storage;
+use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Vec3};
 
 #[test]
 fn at_every_distance_nothing_is_dropped() {

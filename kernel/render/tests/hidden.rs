@@ -2,7 +2,7 @@
 
 use oracle::depth::{check, models};
 use oracle::solid::pose;
-use scene::Storage;
+use render::Storage;
 use texmap::{Mapper, Order};
 
 /// Checks that each pixel shows the nearest face and is written once, in `poses` poses with each of some

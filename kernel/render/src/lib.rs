@@ -1,0 +1,9 @@
+//! Draws frames of a scene.
+#![no_std]
+#![forbid(unsafe_code)]
+
+mod errors;
+pub mod motion;
+mod renderer;
+
+pub use renderer::{MAX_JOBS, SURFACE_BYTES, Stage, Storage};
