@@ -10,7 +10,7 @@ use oracle::coverage::inside;
 use oracle::depth;
 use oracle::solid::{self, Checker, Compared, Solid};
 use oracle::texel::{affine, perspective};
-use render::{Stage, Storage};
+use render::{RenderMemory, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{FOCAL_LENGTH, Pose};
 use texmap::loops::Loop;
@@ -79,7 +79,7 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
         .collect()
 }
 
-fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
+fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expected {
     let (background, convex) = (stage.background(), stage.is_convex());
     let mut expected = Expected {
         colours: (0..WIDTH * HEIGHT)
@@ -163,8 +163,8 @@ fn compare_coverage(
 fn every_golden_is_what_the_oracle_draws() {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = CATALOGUE[0].paint(&mut texels);
-    let mut storage = in_place::boxed!(Storage);
-    let mut stage = Stage::new(&mut storage, CATALOGUE[0].scene(&textures));
+    let mut storage = in_place::boxed!(RenderMemory);
+    let mut stage = SceneRenderer::new(&mut storage, CATALOGUE[0].scene(&textures));
     let mut between = 0;
     for golden in golden::find(&golden_folder()).unwrap() {
         let entry = scene(&golden);

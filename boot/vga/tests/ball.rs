@@ -2,7 +2,7 @@
 
 use modex::registers::{CRTC, MAP_MASK, MODE_X, SEQUENCER, START_ADDRESS_HIGH};
 use modex::{Counted, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Purpose, WIDTH};
-use render::{Stage, Storage};
+use render::{RenderMemory, SceneRenderer};
 use scene::Pose;
 use vga::Vga;
 
@@ -11,8 +11,8 @@ fn every_frame_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
     let mut texels = Box::new([0; scene::TEXELS]);
     let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);
-    let mut storage = in_place::boxed!(Storage);
-    let mut stage = Stage::new(&mut storage, scene);
+    let mut storage = in_place::boxed!(RenderMemory);
+    let mut stage = SceneRenderer::new(&mut storage, scene);
     let mut card = ModeX::set(Counted::new(Vga::new()), scene.palette).unwrap();
     let mut columns = 0;
     for frame in [0, 1000, u32::MAX, 360, 0] {

@@ -5,7 +5,7 @@ use core::hint::black_box;
 
 use modex::{Bus, Destination, HEIGHT, ModeX, Offscreen, PlanarBuffer, SetError, WIDTH};
 use protocol::{Checksum, ERROR, Lines, OK};
-use render::{Stage, Storage};
+use render::{RenderMemory, SceneRenderer};
 use scene::Pose;
 use texmap::{Job, JobList, Mapper, Order, Stats, Texture};
 
@@ -45,7 +45,7 @@ pub struct Clock {
 #[derive(Clone, Copy, Debug)]
 pub struct Memory {
     ball: [u8; scene::TEXELS],
-    storage: Storage,
+    storage: RenderMemory,
     square: [u8; screen::TEXELS],
     jobs: JobList<MAX_JOBS>,
     page: PlanarBuffer,
@@ -57,7 +57,7 @@ impl Memory {
     pub const fn new() -> Self {
         Self {
             ball: [0; scene::TEXELS],
-            storage: Storage::new(),
+            storage: RenderMemory::new(),
             square: [0; screen::TEXELS],
             jobs: JobList::new(),
             page: PlanarBuffer::new(),
@@ -76,7 +76,7 @@ impl Default for Memory {
 #[derive(Debug)]
 pub struct Bench<'a, B> {
     card: ModeX<B>,
-    stage: Stage<'a>,
+    stage: SceneRenderer<'a>,
     pose: Pose,
     /// The ball's texture in full light. Making jobs reads only a texture's sides, which are the same in
     /// every light.
@@ -96,7 +96,7 @@ impl<'a, B: Bus> Bench<'a, B> {
     /// As [`ModeX::set`].
     pub fn new(memory: &'a mut Memory, bus: B) -> Result<Self, SetError> {
         let ball = [scene::paint_ball(&mut memory.ball)];
-        let stage = Stage::new(&mut memory.storage, scene::ball(&ball));
+        let stage = SceneRenderer::new(&mut memory.storage, scene::ball(&ball));
         let card = ModeX::set(bus, stage.palette())?;
         Ok(Self {
             card,

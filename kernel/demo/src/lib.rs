@@ -28,7 +28,7 @@ use protocol::{
     Action, Change, Command, Content, ERROR, Fault, FrameName, Lines, Motion, OK, PROTOCOL,
     RUNNING, Reception, Setting, Word,
 };
-use render::{Stage, Storage};
+use render::{RenderMemory, SceneRenderer};
 use scene::Pose;
 use scene::catalogue::{Entry, MAX_TEXELS};
 use texmap::{Mapper, Order, Stats};
@@ -57,7 +57,7 @@ pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 pub struct Memory {
     model: Arena,
     texels: [u8; MAX_TEXELS],
-    storage: Storage,
+    storage: RenderMemory,
     offscreen: Offscreen,
     notes: Notes,
     writing: Writing,
@@ -69,7 +69,7 @@ impl Memory {
         Self {
             model: Arena::new(),
             texels: [0; MAX_TEXELS],
-            storage: Storage::new(),
+            storage: RenderMemory::new(),
             offscreen: Offscreen::new(),
             notes: Log::NOTES,
             writing: Writing::new(),
@@ -130,7 +130,7 @@ pub struct Show<'a, B> {
     reception: Reception,
     /// The memory that the scene's texture is painted into.
     texels: &'a mut [u8; MAX_TEXELS],
-    stage: Stage<'a>,
+    stage: SceneRenderer<'a>,
     offscreen: &'a mut Offscreen,
     lines: Lines,
     /// The frame on the screen; `None` after a reset of the card.
@@ -159,7 +159,7 @@ impl<'a, B: Bus> Show<'a, B> {
         let scenes = Scenes::new(model_file.map(|model_file| model_file.entry(arena)));
         let state = State::of(scenes, scenes.default());
         let textures = state.entry.paint(&mut memory.texels);
-        let stage = Stage::new(&mut memory.storage, state.entry.scene(&textures));
+        let stage = SceneRenderer::new(&mut memory.storage, state.entry.scene(&textures));
         Ok(Self {
             model_file: model_file.map(ModelFile::checksum),
             state,
@@ -688,7 +688,7 @@ impl<'a, B: Bus> Show<'a, B> {
 /// Draws a frame, or its split view. Returns counts of what was drawn, and the largest error in 2^-16 texel:
 /// 0 if the frame is not split.
 fn paint(
-    stage: &mut Stage<'_>,
+    stage: &mut SceneRenderer<'_>,
     split: Option<&Split>,
     pose: &Pose,
     destination: &mut impl Destination,

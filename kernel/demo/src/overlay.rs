@@ -13,7 +13,7 @@ use core::fmt::{self, Write};
 
 use modex::{Destination, HEIGHT, Palette, WIDTH};
 use protocol::{Action, TICKS_PER_SECOND};
-use render::motion::Motion;
+use render::motion::TextureMotion;
 use scene::font;
 use texmap::{Mapper, Order};
 
@@ -318,7 +318,7 @@ impl<'a> Overlay<'a> {
         &mut self,
         tick: u32,
         figures: &Figures,
-        motion: impl FnOnce() -> Option<Motion>,
+        motion: impl FnOnce() -> Option<TextureMotion>,
     ) -> bool {
         let ticks = tick.wrapping_sub(self.window.since);
         if ticks >= RENEWAL {
@@ -409,7 +409,7 @@ impl<'a> Overlay<'a> {
         }
     }
 
-    fn write_info(&mut self, figures: &Figures, motion: Option<Motion>) {
+    fn write_info(&mut self, figures: &Figures, motion: Option<TextureMotion>) {
         let Figures {
             scene,
             mapper,
@@ -483,7 +483,10 @@ impl<'a> Overlay<'a> {
 
 /// Returns how far the visible texture moves from one frame to the next, and the range in which the eye sees
 /// that as motion (the sweet spot), in 2^-16 pixel. `None` if the frame rate is unknown.
-fn moved(motion: Option<Motion>, pace: Option<(u32, u32)>) -> Option<(u32, Option<(u32, u32)>)> {
+fn moved(
+    motion: Option<TextureMotion>,
+    pace: Option<(u32, u32)>,
+) -> Option<(u32, Option<(u32, u32)>)> {
     let (motion, (tenths, _)) = motion.zip(pace)?;
     // Ticks a frame, 16.16.
     let ticks = ((10 * TICKS_PER_SECOND) << 16).checked_div(tenths)?;
@@ -613,7 +616,7 @@ mod tests {
     };
 
     /// A motion of 1.5 pixels a tick, a quarter of half a period.
-    const MOTION: Motion = Motion {
+    const MOTION: TextureMotion = TextureMotion {
         pixels: 3 << 15,
         part: 1 << 14,
     };
@@ -623,7 +626,7 @@ mod tests {
     }
 
     /// Returns the lines of `info` after a second of frames, `every` ticks apart.
-    fn info(every: u32, figures: &Figures, motion: Option<Motion>) -> Vec<(Ink, String)> {
+    fn info(every: u32, figures: &Figures, motion: Option<TextureMotion>) -> Vec<(Ink, String)> {
         let mut writing = Box::new(Writing::new());
         let mut overlay = overlay(&mut writing);
         overlay.act(0, Action::Info);
@@ -670,7 +673,7 @@ mod tests {
     #[test]
     fn info_says_whether_the_motion_is_in_the_sweet_spot() {
         let says = |every, pixels, part| {
-            let motion = Some(Motion { pixels, part });
+            let motion = Some(TextureMotion { pixels, part });
             info(every, &FIGURES, motion)[5..].to_vec()
         };
         assert_eq!(

@@ -10,7 +10,7 @@
 use core::ops::Range;
 
 use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH, Window};
-use render::Stage;
+use render::SceneRenderer;
 use scene::Pose;
 use texmap::{Mapper, Stats};
 
@@ -73,7 +73,7 @@ impl Split {
     /// 2^-16 texel.
     pub fn draw(
         &self,
-        stage: &mut Stage<'_>,
+        stage: &mut SceneRenderer<'_>,
         pose: &Pose,
         destination: &mut impl Destination,
     ) -> (Stats, u32) {

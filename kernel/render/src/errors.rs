@@ -8,12 +8,12 @@ use texmap::plane::coordinate;
 
 use scene::Pose;
 
-use crate::Stage;
-use crate::motion::Quality;
+use crate::SceneRenderer;
+use crate::motion::MapperChoice;
 use crate::renderer::{lit, polygons};
 
-impl Stage<'_> {
-    /// Draws the solid as [`Stage::draw`] does, but colours each pixel by the mapper's error there: the
+impl SceneRenderer<'_> {
+    /// Draws the solid as [`SceneRenderer::draw`] does, but colours each pixel by the mapper's error there: the
     /// larger of the differences in u and v from the exact quotients, in 2^-16 texel. Columns outside
     /// `columns` may be left out. Returns the largest error in `columns`.
     ///
@@ -29,7 +29,7 @@ impl Stage<'_> {
             self.find_visible(pose);
         }
         let visible = &*self.visible;
-        let quality = Quality::of(self.mapper, pose, self.next.as_ref());
+        let quality = MapperChoice::of(self.mapper, pose, self.next.as_ref());
         let mut most = 0;
         polygons(
             &self.mesh,
@@ -51,7 +51,7 @@ impl Stage<'_> {
                     if job.is_column() && !columns.contains(&job.x) {
                         return;
                     }
-                    let mut run = Run::new();
+                    let mut run = Strip::new();
                     job.pixels(&texture, |place, coordinates| {
                         let error = error(place, coordinates);
                         if columns.contains(&place.0) {
@@ -75,13 +75,13 @@ impl Stage<'_> {
 }
 
 /// A vertical strip of pixels that is not drawn yet.
-struct Run {
+struct Strip {
     place: (u16, u16),
     colours: [u8; HEIGHT],
     len: u16,
 }
 
-impl Run {
+impl Strip {
     fn new() -> Self {
         Self {
             place: (0, 0),
@@ -116,7 +116,7 @@ impl Run {
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use crate::{Stage, Storage};
+    use crate::{RenderMemory, SceneRenderer};
     use modex::{PlanarBuffer, WIDTH};
     use scene::Pose;
     use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
@@ -124,16 +124,19 @@ mod tests {
     use texmap::Mapper;
 
     /// Calls `check` with a scene's entry and a stage of it.
-    fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut Stage<'_>)) {
+    fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)) {
         let entry = CATALOGUE.iter().find(|entry| entry.name == name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
         let textures = entry.paint(&mut texels);
-        let mut storage = in_place::boxed!(Storage);
-        check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
+        let mut storage = in_place::boxed!(RenderMemory);
+        check(
+            entry,
+            &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+        );
     }
 
     /// The largest error of a frame. Every pixel of the solid has an error, and no other pixel has.
-    fn largest(stage: &mut Stage<'_>, pose: &Pose) -> u32 {
+    fn largest(stage: &mut SceneRenderer<'_>, pose: &Pose) -> u32 {
         let mut drawn = Box::new(PlanarBuffer::new());
         let stats = stage.draw(pose, &mut *drawn);
         let mut page = Box::new(PlanarBuffer::new());

@@ -6,4 +6,4 @@ mod errors;
 pub mod motion;
 mod renderer;
 
-pub use renderer::{MAX_JOBS, SURFACE_BYTES, Stage, Storage};
+pub use renderer::{MAX_JOBS, RenderMemory, SURFACE_BYTES, SceneRenderer};

@@ -38,11 +38,11 @@ use texmap::{Face, Mapper, Texture};
 use scene::trig::sin;
 use scene::{FOCAL_LENGTH, Orientation, Pose, Vec3};
 
-use crate::Stage;
+use crate::SceneRenderer;
 use crate::renderer::{lit, polygons};
 
 /// Images a second that the eye still sees one by one, not as motion. (P. Read and M.-P. Meyer, Restoration
-/// of Motion FrameName Film, 2000: 10 to 12.)
+/// of Motion Picture Film, 2000: 10 to 12.)
 pub const STEPS_A_SECOND: u32 = 12;
 
 /// Pixels from one sample to the next, in x and y.
@@ -52,14 +52,14 @@ const SAMPLES: usize = WIDTH / GRID as usize * (HEIGHT / GRID as usize);
 
 /// The motion of the visible texture in one tick: medians over the sampled pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Motion {
+pub struct TextureMotion {
     /// On the screen, in 2^-16 pixel.
     pub pixels: u32,
     /// In the texture, as a fraction of half its period, in 2^-16.
     pub part: u32,
 }
 
-impl Motion {
+impl TextureMotion {
     /// Returns the least and most pixels from frame to frame, 16.16, that the eye sees as motion. A frame
     /// lasts `ticks` ticks, 16.16. Returns `None` if nothing moves in the texture.
     pub fn sweet_spot(&self, ticks: u32, ticks_a_second: u32) -> Option<(u32, u32)> {
@@ -71,12 +71,12 @@ impl Motion {
 
 /// The motion from one pose of the solid to another.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Move {
+pub(crate) struct PoseChange {
     from: (Orientation, i32),
     to: (Orientation, i32),
 }
 
-impl Move {
+impl PoseChange {
     pub fn new(from: &Pose, to: &Pose) -> Self {
         let [from, to] = [from, to].map(|pose| (pose.orientation(), pose.distance));
         Self { from, to }
@@ -133,20 +133,20 @@ impl Move {
 
 /// Chooses the mapper of each face.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Quality {
+pub(crate) struct MapperChoice {
     mapper: Mapper,
     /// The faster mapper, and the motion that hides its errors.
-    lower: Option<(Mapper, Move)>,
+    lower: Option<(Mapper, PoseChange)>,
 }
 
-impl Quality {
+impl MapperChoice {
     /// Full quality with `mapper`, or reduced quality where the motion from `pose` to `next` hides it.
     pub fn of(mapper: Mapper, pose: &Pose, next: Option<&Pose>) -> Self {
         let next = next.filter(|next| *next != pose);
         let lower = mapper.lower().zip(next);
         Self {
             mapper,
-            lower: lower.map(|(lower, next)| (lower, Move::new(pose, next))),
+            lower: lower.map(|(lower, next)| (lower, PoseChange::new(pose, next))),
         }
     }
 
@@ -203,15 +203,15 @@ pub(crate) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
     Some(((1u64 << 46) / u64::from(angle.max(1))).min(1 << 31) as u32)
 }
 
-impl Stage<'_> {
+impl SceneRenderer<'_> {
     /// Returns how the visible texture in `pose` moves to `next`, or `None` if too little of it is visible.
-    pub fn motion(&mut self, pose: &Pose, next: &Pose) -> Option<Motion> {
+    pub fn motion(&mut self, pose: &Pose, next: &Pose) -> Option<TextureMotion> {
         if !self.mesh.convex {
             self.find_visible(pose);
         }
         let visible = &*self.visible;
         let half_period = self.half_period?;
-        let moved = Move::new(pose, next);
+        let moved = PoseChange::new(pose, next);
         let (mut pixels, mut parts) = ([0; SAMPLES], [0; SAMPLES]);
         let mut count = 0;
         polygons(
@@ -248,7 +248,7 @@ impl Stage<'_> {
             },
         );
         let median = |values: &mut [u32]| *values.select_nth_unstable(values.len() / 2).1;
-        (count > 0).then(|| Motion {
+        (count > 0).then(|| TextureMotion {
             pixels: median(&mut pixels[..count]),
             part: median(&mut parts[..count]),
         })
@@ -290,7 +290,7 @@ fn sample(before: &Plane, after: &Plane, size: (u16, u16), x: u16, y: u16) -> Op
 mod tests {
     extern crate std;
     use super::*;
-    use crate::Storage;
+    use crate::RenderMemory;
     use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
     use std::boxed::Box;
     use std::vec::Vec;
@@ -333,18 +333,21 @@ mod tests {
     }
 
     /// Calls `check` with each scene's entry and a stage of it.
-    fn staged(mut check: impl FnMut(&Entry<'_>, &mut Stage<'_>)) {
+    fn staged(mut check: impl FnMut(&Entry<'_>, &mut SceneRenderer<'_>)) {
         for entry in &CATALOGUE {
             let mut texels = Box::new([0; MAX_TEXELS]);
             let textures = entry.paint(&mut texels);
-            let mut storage = in_place::boxed!(Storage);
-            check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
+            let mut storage = in_place::boxed!(RenderMemory);
+            check(
+                entry,
+                &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+            );
         }
     }
 
     /// The median motion, found another way: a ray from each pixel to the visible face, in floating point,
     /// moves with the solid to its next place on the screen. The grid is finer.
-    fn median_by_rays(stage: &mut Stage<'_>, pose: &Pose, next: &Pose) -> f64 {
+    fn median_by_rays(stage: &mut SceneRenderer<'_>, pose: &Pose, next: &Pose) -> f64 {
         let rows = |pose: &Pose| {
             let orientation = pose.orientation();
             let columns = [0, 1, 2].map(|k| {
@@ -448,13 +451,16 @@ mod tests {
     /// If a frame lasts more ticks, steps come more slowly, and the least motion grows.
     #[test]
     fn the_sweet_spot_scales_with_the_rate_of_frames() {
-        let motion = Motion {
+        let motion = TextureMotion {
             pixels: 1 << 16,
             part: 1 << 14,
         };
         assert_eq!(motion.sweet_spot(1 << 16, 60), Some((13_107, 4 << 16)));
         assert_eq!(motion.sweet_spot(5 << 16, 60), Some((1 << 16, 4 << 16)));
-        assert_eq!(Motion { part: 0, ..motion }.sweet_spot(1 << 16, 60), None);
+        assert_eq!(
+            TextureMotion { part: 0, ..motion }.sweet_spot(1 << 16, 60),
+            None
+        );
     }
 
     /// A face that turns in its own plane keeps its quality with every mapper; a face that tumbles does not.

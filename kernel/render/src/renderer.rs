@@ -4,13 +4,13 @@ use modex::{Destination, HEIGHT, Palette};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Texture, Vertex, Visible};
 
-use scene::clip::{Point, place};
+use scene::clip::{ViewPoint, place};
 use scene::{
     FOCAL_LENGTH, LIGHT_LEVELS, MATERIALS, MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh,
     Pose, Scene, lit_level,
 };
 
-use crate::motion::{self, Quality};
+use crate::motion::{self, MapperChoice};
 
 /// Most jobs that are collected before they are drawn.
 pub const MAX_JOBS: usize = 4096;
@@ -23,26 +23,26 @@ const MIPMAPS: usize = 7;
 
 /// Fixed arenas for drawing.
 #[derive(Clone, Copy, Debug)]
-pub struct Storage {
+pub struct RenderMemory {
     surfaces: [u8; SURFACE_BYTES],
-    points: [Point; MAX_VERTICES],
+    points: [ViewPoint; MAX_VERTICES],
     visible: Visible<MAX_FACES>,
     jobs: JobList<MAX_JOBS>,
 }
 
-impl Storage {
+impl RenderMemory {
     /// Empty arenas, about 3 MiB: intended for a static.
     pub const fn new() -> Self {
         Self {
             surfaces: [0; SURFACE_BYTES],
-            points: [Point::ORIGIN; MAX_VERTICES],
+            points: [ViewPoint::ORIGIN; MAX_VERTICES],
             visible: Visible::new(),
             jobs: JobList::new(),
         }
     }
 }
 
-impl Default for Storage {
+impl Default for RenderMemory {
     fn default() -> Self {
         Self::new()
     }
@@ -97,10 +97,10 @@ impl Surface {
 /// A scene with its textures lit.
 ///
 /// Light in the mapper would cost a second look-up for every pixel. A face has one light level, so
-/// [`Stage::set`] runs each texture through the light table once per level, and a face uses the copy for its
+/// [`SceneRenderer::set`] runs each texture through the light table once per level, and a face uses the copy for its
 /// level. The mapper's loop needs no light.
 #[derive(Debug)]
-pub struct Stage<'a> {
+pub struct SceneRenderer<'a> {
     name: &'static str,
     pub(crate) mesh: Mesh<'a>,
     palette: &'a Palette,
@@ -117,18 +117,18 @@ pub struct Stage<'a> {
     pub(crate) half_period: Option<u32>,
     pub(crate) surfaces: [Surface; MAX_TEXTURES],
     pub(crate) texels: &'a mut [u8; SURFACE_BYTES],
-    pub(crate) points: &'a mut [Point; MAX_VERTICES],
+    pub(crate) points: &'a mut [ViewPoint; MAX_VERTICES],
     pub(crate) visible: &'a mut Visible<MAX_FACES>,
     jobs: &'a mut JobList<MAX_JOBS>,
 }
 
-impl<'a> Stage<'a> {
+impl<'a> SceneRenderer<'a> {
     /// Lights the textures of `scene` into `storage`.
     ///
     /// # Panics
-    /// As [`Stage::set`].
-    pub fn new(storage: &'a mut Storage, scene: Scene<'a, '_>) -> Self {
-        let Storage {
+    /// As [`SceneRenderer::set`].
+    pub fn new(storage: &'a mut RenderMemory, scene: Scene<'a, '_>) -> Self {
+        let RenderMemory {
             surfaces,
             points,
             visible,
@@ -321,7 +321,7 @@ impl<'a> Stage<'a> {
             }
         }
         let visible = &*self.visible;
-        let quality = Quality::of(mapper, pose, self.next.as_ref());
+        let quality = MapperChoice::of(mapper, pose, self.next.as_ref());
         let mut lowered = 0;
         let mut renderer = Renderer::new(self.jobs, &surfaces, destination, mapper, order);
         polygons(
@@ -387,7 +387,7 @@ pub(crate) fn lit<'t>(
 pub(crate) fn polygons(
     mesh: &Mesh<'_>,
     mipmaps: usize,
-    points: &mut [Point; MAX_VERTICES],
+    points: &mut [ViewPoint; MAX_VERTICES],
     pose: &Pose,
     mut sink: impl FnMut(u16, Option<Face<'_>>),
 ) {
@@ -399,7 +399,7 @@ pub(crate) fn polygons(
     let orientation = pose.orientation();
     for (point, &vertex) in points.iter_mut().zip(mesh.vertices) {
         let [x, y, z] = orientation.turn(vertex);
-        *point = Point::new([x, y, z + pose.distance]);
+        *point = ViewPoint::new([x, y, z + pose.distance]);
     }
     let mut polygon = [Vertex::default(); MAX_SIDES];
     for (number, face) in (0..).zip(mesh.faces) {

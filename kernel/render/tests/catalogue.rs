@@ -1,19 +1,22 @@
 //! Frames of the built-in scenes.
 
 use modex::PlanarBuffer;
-use render::{Stage, Storage};
+use render::{RenderMemory, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 
 /// Ticks from a whole turn, at irregular intervals.
 const TICKS: [u32; 9] = [0, 1, 89, 180, 271, 360, 447, 540, 719];
 
 /// Calls `check` with an entry and a stage of it.
-fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut Stage<'_>)) {
+fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)) {
     let entry = Entry::parse(name).unwrap();
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = entry.paint(&mut texels);
-    let mut storage = in_place::boxed!(Storage);
-    check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
+    let mut storage = in_place::boxed!(RenderMemory);
+    check(
+        entry,
+        &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+    );
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use oracle::depth::{check, models};
 use oracle::solid::pose;
-use render::Storage;
+use render::RenderMemory;
 use texmap::{Mapper, Order};
 
 /// Checks that each pixel shows the nearest face and is written once, in `poses` poses with each of some
@@ -11,7 +11,7 @@ use texmap::{Mapper, Order};
 fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
     let poses = seeded::cases(poses);
     let mut random = seeded::generator();
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     let mut models = models(&mut random);
     random.shuffle(&mut models);
     let solids = seeded::cases(models.len());

@@ -23,5 +23,5 @@ pub use camera::{FOCAL_LENGTH, NEAR};
 pub use catalogue::ball::{TEXELS, ball, paint_ball};
 pub use colour::{AMBIENT, FULL_LIGHT, LIGHT_LEVELS, LightTable, MATERIALS, lit_level};
 pub use entry::Scene;
-pub use mesh::{Corner, Face, MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh, Vec3};
+pub use mesh::{Corner, MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh, MeshFace, Vec3};
 pub use pose::{Orientation, Pose};

@@ -33,7 +33,7 @@ pub struct Corner {
 
 /// A flat convex face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Face {
+pub struct MeshFace {
     /// Index of the face's first corner. The corners follow each other clockwise when the face looks at the
     /// viewer.
     pub first: u16,
@@ -53,7 +53,7 @@ pub struct Mesh<'a> {
     /// Corners of all faces.
     pub corners: &'a [Corner],
     /// Faces.
-    pub faces: &'a [Face],
+    pub faces: &'a [MeshFace],
     /// Whether no front face can hide a part of another, as in a convex solid or a single face. A mesh that
     /// is not convex has at most [`MAX_FACES`] faces.
     pub convex: bool,

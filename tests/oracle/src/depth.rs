@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use fastrand::Rng;
 use modex::{HEIGHT, WIDTH};
-use render::{Stage, Storage};
+use render::{RenderMemory, SceneRenderer};
 use scene::{FOCAL_LENGTH, Pose, Vec3};
 use texmap::{Face, Mapper, Order, Point};
 
@@ -83,7 +83,7 @@ pub struct Compared {
 /// # Errors
 /// A description of the first difference.
 pub fn check(
-    storage: &mut Storage,
+    storage: &mut RenderMemory,
     solid: &Solid,
     pose: &Pose,
     mapper: Mapper,
@@ -138,13 +138,13 @@ pub fn check(
 }
 
 /// The numbers of the front faces that cover each pixel, the nearest first.
-pub fn nearest(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<u16>> {
+pub fn nearest(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<u16>> {
     let numbers = |faces: Vec<(u16, Nearness)>| faces.into_iter().map(|face| face.0).collect();
     sorted(stage, pose).into_iter().map(numbers).collect()
 }
 
 /// The faces that cover each pixel, the nearest first.
-fn sorted(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
+fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
     let mut at = vec![Vec::new(); WIDTH * HEIGHT];
     let mut covered = Pixels::default();
     stage.polygons(pose, |number, face| {
