@@ -10,7 +10,7 @@ use oracle::coverage::inside;
 use oracle::depth;
 use oracle::solid::{self, Checker, Compared, Solid};
 use oracle::texel::{affine, perspective};
-use render::{RenderMemory, SceneRenderer};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{FOCAL_LENGTH, Pose};
 use texmap::loops::Loop;
@@ -193,9 +193,11 @@ fn every_golden_is_what_the_oracle_draws() {
         let exact = expected(&mut stage, &pose, Mapper::Exact);
         let mut page = Box::new(PlanarBuffer::new());
         page.clear(background);
-        stage.set_mapper(Mapper::Exact);
-        let stats = stage.draw(&pose, &mut *page);
-        stage.set_mapper(Mapper::default());
+        let options = RenderOptions {
+            mapper: Mapper::Exact,
+            ..RenderOptions::default()
+        };
+        let stats = stage.draw(&pose, options, &mut *page).stats;
         assert_eq!(stats.dropped, 0, "{}", golden.name);
         let name = format!("{} by the exact mapper", golden.name);
         compare(&name, &exact, |i| page.pixel(i % WIDTH, i / WIDTH));

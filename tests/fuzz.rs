@@ -18,7 +18,7 @@ use import::{Model, obj, solid, texture};
 use in_place::InPlace;
 use model::{Arena, MAX_BYTES, ModelFile, Parts};
 use modex::PlanarBuffer;
-use render::{RenderMemory, SceneRenderer};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
 use scene::{MAX_EXTENT, Mesh, Pose};
 use texmap::{Mapper, Texture};
@@ -60,7 +60,10 @@ impl Room {
         let entry = model_file.entry(&mut self.arena);
         let textures = entry.paint(&mut self.painted);
         let mut stage = SceneRenderer::new(&mut self.storage, entry.scene(&textures));
-        stage.set_mapper(Mapper::ALL[random.usize(..Mapper::ALL.len())].1);
+        let options = RenderOptions {
+            mapper: Mapper::ALL[random.usize(..Mapper::ALL.len())].1,
+            ..RenderOptions::default()
+        };
         let mut pose = Pose {
             yaw: random.u32(..),
             pitch: random.u32(..),
@@ -70,7 +73,7 @@ impl Room {
         if random.u8(..8) == 0 {
             pose.distance = *random.choice(&[0, 1, Pose::MAX_DISTANCE]).unwrap();
         }
-        stage.draw(&pose, &mut *self.page);
+        stage.draw(&pose, options, &mut *self.page);
     }
 }
 

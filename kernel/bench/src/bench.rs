@@ -5,7 +5,7 @@ use core::hint::black_box;
 
 use modex::{Bus, Destination, HEIGHT, ModeX, Offscreen, PlanarBuffer, SetError, WIDTH};
 use protocol::{Checksum, ERROR, Lines, OK};
-use render::{RenderMemory, SceneRenderer};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::Pose;
 use texmap::{Job, JobList, Mapper, Order, Stats, Texture};
 
@@ -77,6 +77,8 @@ impl Default for Memory {
 pub struct Bench<'a, B> {
     card: ModeX<B>,
     stage: SceneRenderer<'a>,
+    /// The mapper and the order of the work.
+    options: RenderOptions,
     pose: Pose,
     /// The ball's texture in full light. Making jobs reads only a texture's sides, which are the same in
     /// every light.
@@ -101,6 +103,7 @@ impl<'a, B: Bus> Bench<'a, B> {
         Ok(Self {
             card,
             stage,
+            options: RenderOptions::default(),
             pose: Pose::at_tick(FRAME),
             ball: ball[0],
             screen: Screen::new(),
@@ -193,8 +196,11 @@ impl<'a, B: Bus> Bench<'a, B> {
 
     /// Sets the mapper and the order of the work that follows.
     pub fn set(&mut self, mapper: Mapper, order: Order) {
-        self.stage.set_mapper(mapper);
-        self.stage.set_order(order);
+        self.options = RenderOptions {
+            mapper,
+            order,
+            next: None,
+        };
     }
 
     /// Prepares a piece of work, so that each repetition is the same.
@@ -207,7 +213,7 @@ impl<'a, B: Bus> Bench<'a, B> {
                 let background = self.stage.background();
                 for _ in 0..modex::PAGES {
                     self.offscreen.begin(background);
-                    self.stage.draw(&self.pose, self.offscreen);
+                    self.stage.draw(&self.pose, self.options, self.offscreen);
                     self.card.present(self.offscreen);
                     self.card.flip();
                 }
@@ -221,7 +227,7 @@ impl<'a, B: Bus> Bench<'a, B> {
     /// # Panics
     /// If the mapper drops a face.
     pub fn run(&mut self, work: Work, now: fn() -> u64) -> u64 {
-        let (mapper, order) = (self.stage.mapper(), self.stage.order());
+        let RenderOptions { mapper, order, .. } = self.options;
         let background = self.stage.background();
         let mut stats = Stats::default();
         let ticks = match work {
@@ -254,7 +260,7 @@ impl<'a, B: Bus> Bench<'a, B> {
             Work::FrameCard => ticks(now, &mut || {
                 for _ in 0..work.frames() {
                     let mut canvas = self.card.begin(background);
-                    stats = self.stage.draw(&self.pose, &mut canvas);
+                    stats = self.stage.draw(&self.pose, self.options, &mut canvas).stats;
                     self.card.flip();
                 }
             }),
@@ -276,7 +282,7 @@ impl<'a, B: Bus> Bench<'a, B> {
             Work::FrameDrawCard => {
                 let mut canvas = self.card.begin(background);
                 let ticks = ticks(now, &mut || {
-                    stats = self.stage.draw(&self.pose, &mut canvas);
+                    stats = self.stage.draw(&self.pose, self.options, &mut canvas).stats;
                 });
                 self.card.flip();
                 ticks
@@ -284,13 +290,19 @@ impl<'a, B: Bus> Bench<'a, B> {
             Work::FrameDrawRam => {
                 self.offscreen.begin(background);
                 ticks(now, &mut || {
-                    stats = self.stage.draw(&self.pose, self.offscreen);
+                    stats = self
+                        .stage
+                        .draw(&self.pose, self.options, self.offscreen)
+                        .stats;
                 })
             }
             Work::FramePresented => ticks(now, &mut || {
                 for _ in 0..work.frames() {
                     self.offscreen.begin(background);
-                    stats = self.stage.draw(&self.pose, self.offscreen);
+                    stats = self
+                        .stage
+                        .draw(&self.pose, self.options, self.offscreen)
+                        .stats;
                     self.card.present(self.offscreen);
                     self.card.flip();
                 }
@@ -327,7 +339,7 @@ impl<'a, B: Bus> Bench<'a, B> {
 
     /// Measures a face whose spans are all `length` pixels long: making its jobs, and drawing them in RAM.
     fn runs(&mut self, length: u16, rounds: usize, now: fn() -> u64) -> [Figure; 2] {
-        let (mapper, order) = (self.stage.mapper(), self.stage.order());
+        let RenderOptions { mapper, order, .. } = self.options;
         let Self {
             screen,
             square,
@@ -360,13 +372,16 @@ impl<'a, B: Bus> Bench<'a, B> {
     }
 
     fn make_screen_jobs(&mut self) {
-        let mapper = self.stage.mapper();
+        let mapper = self.options.mapper;
         make_jobs(&self.screen, mapper, &self.square, self.jobs);
     }
 
     fn pixels_of_the_ball(&mut self) -> usize {
         self.offscreen.begin(self.stage.background());
-        self.stage.draw(&self.pose, self.offscreen).pixels as usize
+        self.stage
+            .draw(&self.pose, self.options, self.offscreen)
+            .stats
+            .pixels as usize
     }
 
     /// Returns the CRC-32 of the frame at a place, pixel by pixel from the top left.

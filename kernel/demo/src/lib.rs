@@ -28,7 +28,7 @@ use protocol::{
     Action, Change, Command, Content, ERROR, Fault, FrameName, Lines, Motion, OK, PROTOCOL,
     RUNNING, Reception, Setting, Word,
 };
-use render::{RenderMemory, SceneRenderer};
+use render::{Drawn, RenderMemory, RenderOptions, SceneRenderer};
 use scene::Pose;
 use scene::catalogue::{Entry, MAX_TEXELS};
 use texmap::{Mapper, Order, Stats};
@@ -136,7 +136,7 @@ pub struct Show<'a, B> {
     /// The frame on the screen; `None` after a reset of the card.
     shown: Option<Shown>,
     /// Counts of what was drawn for the last frame.
-    drawn: Stats,
+    drawn: Drawn,
     /// The largest error in the last frame if it was a split view, and 0 otherwise, in 2^-16 texel.
     most: u32,
     /// `None` while the demo is held.
@@ -174,7 +174,7 @@ impl<'a, B: Bus> Show<'a, B> {
             offscreen: &mut memory.offscreen,
             lines: Lines::new(),
             shown: None,
-            drawn: Stats::default(),
+            drawn: Drawn::default(),
             most: 0,
             pace: Some(Pace::default()),
         })
@@ -357,15 +357,17 @@ impl<'a, B: Bus> Show<'a, B> {
     fn draw(&mut self, frame: FrameName, pose: &Pose, next: Option<Pose>, overlay: bool) {
         self.card.bus().take_counts();
         let State { mapper, order, .. } = self.state;
-        self.stage.set_mapper(mapper);
-        self.stage.set_order(order);
-        self.stage.lower_for(next);
+        let options = RenderOptions {
+            mapper,
+            order,
+            next,
+        };
         let background = self.stage.background();
         let split = self.overlay.split().filter(|_| overlay);
         (self.drawn, self.most) = match order {
             Order::Polygons | Order::Planes => {
                 let mut page = self.card.begin(background);
-                let drawn = paint(&mut self.stage, split, pose, &mut page);
+                let drawn = paint(&mut self.stage, split, pose, options, &mut page);
                 if overlay {
                     self.overlay.draw(page.overlay());
                 }
@@ -373,7 +375,7 @@ impl<'a, B: Bus> Show<'a, B> {
             }
             Order::Buffer => {
                 self.offscreen.begin(background);
-                let drawn = paint(&mut self.stage, split, pose, self.offscreen);
+                let drawn = paint(&mut self.stage, split, pose, options, self.offscreen);
                 if overlay {
                     self.overlay.draw(self.offscreen);
                 }
@@ -383,7 +385,7 @@ impl<'a, B: Bus> Show<'a, B> {
         };
         self.card.flip();
         // A motion that reduces no face's quality makes no difference, so it is not part of the name.
-        let reduced = next.filter(|_| self.stage.lowered() > 0);
+        let reduced = next.filter(|_| self.drawn.reduced > 0);
         self.shown = Some(Shown {
             frame,
             motion: reduced.map(|next| motion(pose, &next)),
@@ -414,8 +416,8 @@ impl<'a, B: Bus> Show<'a, B> {
             mapper: self.state.mapper,
             order: self.state.order,
             paused: self.state.is_paused(),
-            lowered: state.lower.then(|| stage.lowered()),
-            pixels: self.drawn.pixels,
+            lowered: state.lower.then_some(self.drawn.reduced),
+            pixels: self.drawn.stats.pixels,
             most: self.most,
             map_masks: counts.draw.map_mask + counts.erase.map_mask,
         };
@@ -567,7 +569,7 @@ impl<'a, B: Bus> Show<'a, B> {
     /// Sets the card's mode and palette again. No frame is on the card afterwards.
     fn reset(&mut self) {
         self.shown = None;
-        (self.drawn, self.most) = (Stats::default(), 0);
+        (self.drawn, self.most) = (Drawn::default(), 0);
         self.card.bus().take_counts();
         if let Err(error) = self.card.reset(self.stage.palette()) {
             panic!("the card took Mode X before, and does not take it again: {error}");
@@ -628,7 +630,7 @@ impl<'a, B: Bus> Show<'a, B> {
             pixels,
             dropped,
             full,
-        } = self.drawn;
+        } = self.drawn.stats;
         out(format_args!(
             "frame polygons {polygons} columns {columns} pixels {pixels} dropped {dropped} full {full}"
         ));
@@ -691,11 +693,12 @@ fn paint(
     stage: &mut SceneRenderer<'_>,
     split: Option<&Split>,
     pose: &Pose,
+    options: RenderOptions,
     destination: &mut impl Destination,
-) -> (Stats, u32) {
+) -> (Drawn, u32) {
     match split {
-        Some(split) => split.draw(stage, pose, destination),
-        None => (stage.draw(pose, destination), 0),
+        Some(split) => split.draw(stage, pose, options, destination),
+        None => (stage.draw(pose, options, destination), 0),
     }
 }
 

@@ -10,9 +10,9 @@
 use core::ops::Range;
 
 use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH, Window};
-use render::SceneRenderer;
+use render::{Drawn, RenderOptions, SceneRenderer};
 use scene::Pose;
-use texmap::{Mapper, Stats};
+use texmap::Mapper;
 
 use crate::palette::nearest;
 
@@ -75,19 +75,21 @@ impl Split {
         &self,
         stage: &mut SceneRenderer<'_>,
         pose: &Pose,
+        options: RenderOptions,
         destination: &mut impl Destination,
-    ) -> (Stats, u32) {
+    ) -> (Drawn, u32) {
         let [left, middle, right] = WINDOWS.map(|x| x as u16);
-        let (mapper, lower) = (stage.mapper(), stage.lower_for(None));
-        stage.set_mapper(Mapper::Exact);
-        stage.draw(pose, &mut Window::new(destination, COLUMNS, middle));
-        stage.set_mapper(mapper);
-        stage.lower_for(lower);
+        let exact = RenderOptions {
+            mapper: Mapper::Exact,
+            next: None,
+            ..options
+        };
+        stage.draw(pose, exact, &mut Window::new(destination, COLUMNS, middle));
         let colour = |error| self.heat[step(error)];
         let mut window = Window::new(destination, COLUMNS, right);
-        let most = stage.draw_errors(pose, COLUMNS, colour, &mut window);
-        let stats = stage.draw(pose, &mut Window::new(destination, COLUMNS, left));
-        (stats, most)
+        let most = stage.draw_errors(pose, options, COLUMNS, colour, &mut window);
+        let drawn = stage.draw(pose, options, &mut Window::new(destination, COLUMNS, left));
+        (drawn, most)
     }
 
     /// Draws the bars between the windows, and the heat map's legend.

@@ -382,7 +382,7 @@ mod tests {
     extern crate std;
     use super::*;
     use modex::PlanarBuffer;
-    use render::{RenderMemory, SceneRenderer};
+    use render::{RenderMemory, RenderOptions, SceneRenderer};
     use scene::Pose;
     use std::boxed::Box;
     use std::string::ToString;
@@ -584,7 +584,9 @@ mod tests {
             distance: Pose::MAX_DISTANCE,
             ..entry.pose(77)
         };
-        let stats = stage.draw(&pose, &mut PlanarBuffer::new());
+        let stats = stage
+            .draw(&pose, RenderOptions::default(), &mut PlanarBuffer::new())
+            .stats;
         assert!(stats.polygons > 1000, "{stats:?}");
     }
 }

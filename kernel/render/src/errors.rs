@@ -8,19 +8,20 @@ use texmap::plane::coordinate;
 
 use scene::Pose;
 
-use crate::SceneRenderer;
 use crate::motion::MapperChoice;
 use crate::renderer::{lit, polygons};
+use crate::{RenderOptions, SceneRenderer};
 
 impl SceneRenderer<'_> {
     /// Draws the solid as [`SceneRenderer::draw`] does, but colours each pixel by the mapper's error there: the
     /// larger of the differences in u and v from the exact quotients, in 2^-16 texel. Columns outside
     /// `columns` may be left out. Returns the largest error in `columns`.
     ///
-    /// The order is always polygon by polygon: this view shows errors, not costs.
+    /// The spans are always drawn polygon by polygon: this view shows errors, not costs.
     pub fn draw_errors(
         &mut self,
         pose: &Pose,
+        options: RenderOptions,
         columns: Range<u16>,
         colour: impl Fn(u32) -> u8,
         destination: &mut impl Destination,
@@ -29,7 +30,7 @@ impl SceneRenderer<'_> {
             self.find_visible(pose);
         }
         let visible = &*self.visible;
-        let quality = MapperChoice::of(self.mapper, pose, self.next.as_ref());
+        let choice = MapperChoice::new(&options, pose);
         let mut most = 0;
         polygons(
             &self.mesh,
@@ -62,7 +63,7 @@ impl SceneRenderer<'_> {
                     run.draw(destination);
                 };
                 // A face outside the legal range is not drawn in a normal frame either.
-                let _ = quality
+                let _ = choice
                     .mapper(&face)
                     .jobs(&face, &texture, |job| match self.mesh.convex {
                         true => draw(job),
@@ -116,7 +117,7 @@ impl Strip {
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use crate::{RenderMemory, SceneRenderer};
+    use crate::{RenderMemory, RenderOptions, SceneRenderer};
     use modex::{PlanarBuffer, WIDTH};
     use scene::Pose;
     use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
@@ -136,15 +137,19 @@ mod tests {
     }
 
     /// The largest error of a frame. Every pixel of the solid has an error, and no other pixel has.
-    fn largest(stage: &mut SceneRenderer<'_>, pose: &Pose) -> u32 {
+    fn largest(stage: &mut SceneRenderer<'_>, mapper: &str, pose: &Pose) -> u32 {
+        let options = RenderOptions {
+            mapper: Mapper::parse(mapper).unwrap(),
+            ..RenderOptions::default()
+        };
         let mut drawn = Box::new(PlanarBuffer::new());
-        let stats = stage.draw(pose, &mut *drawn);
+        let stats = stage.draw(pose, options, &mut *drawn).stats;
         let mut page = Box::new(PlanarBuffer::new());
-        let found = stage.draw_errors(pose, 0..WIDTH as u16, |_| 1, &mut *page);
+        let found = stage.draw_errors(pose, options, 0..WIDTH as u16, |_| 1, &mut *page);
         let with = page.planes.as_flattened().iter().filter(|&&byte| byte == 1);
         assert_eq!(with.count(), stats.pixels as usize);
         // The largest error of a part is at most that of the whole.
-        assert!(stage.draw_errors(pose, 108..212, |_| 0, &mut *page) <= found);
+        assert!(stage.draw_errors(pose, options, 108..212, |_| 0, &mut *page) <= found);
         found
     }
 
@@ -161,8 +166,7 @@ mod tests {
                 ("free", 0.0, 0.01),
                 ("exact", 0.0, 0.0),
             ] {
-                stage.set_mapper(Mapper::parse(name).unwrap());
-                let texels = f64::from(largest(stage, &entry.pose(40))) / 65_536.0;
+                let texels = f64::from(largest(stage, name, &entry.pose(40))) / 65_536.0;
                 assert!((least..=most).contains(&texels), "{name}: {texels}");
             }
         });
@@ -173,8 +177,7 @@ mod tests {
     fn hidden_surfaces_have_no_error() {
         staged("knot", |entry, stage| {
             for name in ["shifts", "row-steps", "free", "exact"] {
-                stage.set_mapper(Mapper::parse(name).unwrap());
-                assert_eq!(largest(stage, &entry.pose(40)) == 0, name == "exact");
+                assert_eq!(largest(stage, name, &entry.pose(40)) == 0, name == "exact");
             }
         });
     }

@@ -6,4 +6,4 @@ mod errors;
 pub mod motion;
 mod renderer;
 
-pub use renderer::{MAX_JOBS, RenderMemory, SURFACE_BYTES, SceneRenderer};
+pub use renderer::{Drawn, MAX_JOBS, RenderMemory, RenderOptions, SURFACE_BYTES, SceneRenderer};

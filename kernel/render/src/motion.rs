@@ -38,8 +38,8 @@ use texmap::{Face, Mapper, Texture};
 use scene::trig::sin;
 use scene::{FOCAL_LENGTH, Orientation, Pose, Vec3};
 
-use crate::SceneRenderer;
 use crate::renderer::{lit, polygons};
+use crate::{RenderOptions, SceneRenderer};
 
 /// Images a second that the eye still sees one by one, not as motion. (P. Read and M.-P. Meyer, Restoration
 /// of Motion Picture Film, 2000: 10 to 12.)
@@ -134,27 +134,28 @@ impl PoseChange {
 /// Chooses the mapper of each face.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MapperChoice {
-    mapper: Mapper,
+    /// The mapper in full quality.
+    full: Mapper,
     /// The faster mapper, and the motion that hides its errors.
-    lower: Option<(Mapper, PoseChange)>,
+    reduced: Option<(Mapper, PoseChange)>,
 }
 
 impl MapperChoice {
-    /// Full quality with `mapper`, or reduced quality where the motion from `pose` to `next` hides it.
-    pub fn of(mapper: Mapper, pose: &Pose, next: Option<&Pose>) -> Self {
-        let next = next.filter(|next| *next != pose);
-        let lower = mapper.lower().zip(next);
+    /// The mappers of a frame of `pose`.
+    pub fn new(options: &RenderOptions, pose: &Pose) -> Self {
+        let next = options.next.filter(|next| next != pose);
+        let reduced = options.mapper.lower().zip(next);
         Self {
-            mapper,
-            lower: lower.map(|(lower, next)| (lower, PoseChange::new(pose, next))),
+            full: options.mapper,
+            reduced: reduced.map(|(reduced, next)| (reduced, PoseChange::new(pose, &next))),
         }
     }
 
     /// The mapper for a face.
     pub fn mapper(&self, face: &Face<'_>) -> Mapper {
-        match self.lower {
-            Some((lower, moved)) if moved.hides_errors(&face.anchors) => lower,
-            _ => self.mapper,
+        match &self.reduced {
+            Some((reduced, change)) if change.hides_errors(&face.anchors) => *reduced,
+            _ => self.full,
         }
     }
 }
@@ -467,16 +468,20 @@ mod tests {
     #[test]
     fn a_face_that_moves_in_its_own_plane_keeps_its_quality() {
         staged(|entry, stage| {
-            let mut lowered = 0;
+            let mut reduced = 0;
             for tick in (0..720).step_by(48) {
                 for name in ["exact", "within-1/4", "shifts", "row-steps", "linear-8"] {
-                    stage.set_mapper(Mapper::parse(name).unwrap());
+                    let mapper = Mapper::parse(name).unwrap();
                     let pose = entry.pose(tick);
                     let mut draw = |next| {
-                        stage.lower_for(next);
+                        let options = RenderOptions {
+                            mapper,
+                            next,
+                            ..RenderOptions::default()
+                        };
                         let mut page = Box::new(modex::PlanarBuffer::new());
-                        let stats = stage.draw(&pose, &mut *page);
-                        (stats.pixels, stage.lowered())
+                        let drawn = stage.draw(&pose, options, &mut *page);
+                        (drawn.stats.pixels, drawn.reduced)
                     };
                     let (pixels, none) = draw(None);
                     assert_eq!((none, draw(Some(pose)).1), (0, 0));
@@ -486,11 +491,11 @@ mod tests {
                         some == 0 || ["exact", "within-1/4"].contains(&name),
                         "{name}"
                     );
-                    lowered += some;
+                    reduced += some;
                 }
             }
             let in_plane = ["facing", "tilted"].contains(&entry.name);
-            assert_eq!(lowered == 0, in_plane, "{}: {lowered}", entry.name);
+            assert_eq!(reduced == 0, in_plane, "{}: {reduced}", entry.name);
         });
     }
 }

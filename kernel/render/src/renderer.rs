@@ -21,6 +21,27 @@ const MAX_TEXTURES: usize = 16;
 /// Mipmaps of a texture: the texture itself, and copies down to 1/64 of its sides.
 const MIPMAPS: usize = 7;
 
+/// How a frame is drawn. The default is the default mapper and order, in full quality.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RenderOptions {
+    /// The mapper in full quality.
+    pub mapper: Mapper,
+    /// The order in which the spans are drawn.
+    pub order: Order,
+    /// The pose one tick after the drawn pose. A face whose motion to this pose hides a mapper's errors is drawn
+    /// in reduced quality, by a faster mapper. `None` draws every face in full quality.
+    pub next: Option<Pose>,
+}
+
+/// Counts of a drawn frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drawn {
+    /// Polygons, spans and pixels, drawn and dropped.
+    pub stats: Stats,
+    /// Faces that were drawn in reduced quality.
+    pub reduced: u32,
+}
+
 /// Fixed arenas for drawing.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderMemory {
@@ -107,12 +128,6 @@ pub struct SceneRenderer<'a> {
     background: &'a [u8; HEIGHT],
     /// Mipmaps of each texture of the scene.
     pub(crate) mipmaps: usize,
-    pub(crate) mapper: Mapper,
-    order: Order,
-    /// The pose one tick later, if quality is reduced in motion; and how many faces of the last frame were
-    /// drawn in reduced quality.
-    pub(crate) next: Option<Pose>,
-    lowered: u32,
     /// Half the shortest period of the textures, 16.16 texels.
     pub(crate) half_period: Option<u32>,
     pub(crate) surfaces: [Surface; MAX_TEXTURES],
@@ -140,10 +155,6 @@ impl<'a> SceneRenderer<'a> {
             palette: scene.palette,
             background: scene.background,
             mipmaps: 1,
-            mapper: Mapper::default(),
-            order: Order::default(),
-            next: None,
-            lowered: 0,
             half_period: None,
             surfaces: [Surface::default(); MAX_TEXTURES],
             texels: surfaces,
@@ -270,47 +281,19 @@ impl<'a> SceneRenderer<'a> {
         lit(&self.surfaces, self.texels, number)
     }
 
-    /// The mapper of the next frames.
-    pub fn mapper(&self) -> Mapper {
-        self.mapper
-    }
-
-    /// Sets the mapper of the next frames.
-    pub fn set_mapper(&mut self, mapper: Mapper) {
-        self.mapper = mapper;
-    }
-
-    /// The order in which a frame's spans are drawn.
-    pub fn order(&self) -> Order {
-        self.order
-    }
-
-    /// Sets the order in which the spans of the next frames are drawn.
-    pub fn set_order(&mut self, order: Order) {
-        self.order = order;
-    }
-
-    /// Draws the next frames in reduced quality where motion hides the difference, until the next call.
-    /// `next` is the pose one tick after the drawn pose; `None` restores full quality. Returns the previous
-    /// setting.
-    pub fn lower_for(&mut self, next: Option<Pose>) -> Option<Pose> {
-        core::mem::replace(&mut self.next, next)
-    }
-
-    /// Faces of the last frame that were drawn in reduced quality.
-    pub fn lowered(&self) -> u32 {
-        self.lowered
-    }
-
     /// Draws the solid in `pose` on a destination that contains the background.
     ///
     /// At a distance outside 0 to [`Pose::MAX_DISTANCE`] every face is dropped. At other distances a face is
     /// dropped only if clipping leaves it too many corners.
-    pub fn draw(&mut self, pose: &Pose, destination: &mut impl Destination) -> Stats {
+    pub fn draw(
+        &mut self,
+        pose: &Pose,
+        options: RenderOptions,
+        destination: &mut impl Destination,
+    ) -> Drawn {
         if !self.mesh.convex {
             self.find_visible(pose);
         }
-        let (mapper, order) = (self.mapper, self.order);
         let mut surfaces = [Texture::DOT; MAX_TEXTURES * LIGHT_LEVELS];
         let lit = surfaces.chunks_exact_mut(LIGHT_LEVELS);
         for (surface, lit) in self.surfaces.iter().zip(lit) {
@@ -321,8 +304,9 @@ impl<'a> SceneRenderer<'a> {
             }
         }
         let visible = &*self.visible;
-        let quality = MapperChoice::of(mapper, pose, self.next.as_ref());
-        let mut lowered = 0;
+        let RenderOptions { mapper, order, .. } = options;
+        let choice = MapperChoice::new(&options, pose);
+        let mut reduced = 0;
         let mut renderer = Renderer::new(self.jobs, &surfaces, destination, mapper, order);
         polygons(
             &self.mesh,
@@ -332,8 +316,8 @@ impl<'a> SceneRenderer<'a> {
             |number, face| match face {
                 None => renderer.drop_face(),
                 Some(face) => {
-                    let chosen = quality.mapper(&face);
-                    lowered += u32::from(chosen != mapper);
+                    let chosen = choice.mapper(&face);
+                    reduced += u32::from(chosen != mapper);
                     renderer.set_mapper(chosen);
                     match self.mesh.convex {
                         true => renderer.face(&face),
@@ -342,9 +326,10 @@ impl<'a> SceneRenderer<'a> {
                 }
             },
         );
-        let stats = renderer.finish();
-        self.lowered = lowered;
-        stats
+        Drawn {
+            stats: renderer.finish(),
+            reduced,
+        }
     }
 
     /// Finds the visible face at each pixel, for a mesh of at most [`MAX_FACES`] faces.

@@ -1,7 +1,7 @@
 //! Frames of the built-in scenes.
 
 use modex::PlanarBuffer;
-use render::{RenderMemory, SceneRenderer};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 
 /// Ticks from a whole turn, at irregular intervals.
@@ -25,7 +25,9 @@ fn every_frame_is_whole_and_shows_its_scene() {
         staged(entry.name, |entry, stage| {
             for tick in TICKS {
                 let mut page = PlanarBuffer::new();
-                let stats = stage.draw(&entry.pose(tick), &mut page);
+                let stats = stage
+                    .draw(&entry.pose(tick), RenderOptions::default(), &mut page)
+                    .stats;
                 assert_eq!(stats.dropped, 0, "{} at {tick}", entry.name);
                 let pixels = stats.pixels;
                 let some = (12_000..=76_800).contains(&pixels);

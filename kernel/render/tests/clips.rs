@@ -3,7 +3,7 @@
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::solid::{Checker, Compared, Count, Mix, Solid, length, pose};
-use render::RenderMemory;
+use render::{RenderMemory, RenderOptions};
 use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Vec3};
 
 #[test]
@@ -28,7 +28,7 @@ fn at_every_distance_nothing_is_dropped() {
                 let pose = pose(&mut random, distance);
                 solid.on_stage(&mut storage, |stage| {
                     let mut page = PlanarBuffer::new();
-                    let stats = stage.draw(&pose, &mut page);
+                    let stats = stage.draw(&pose, RenderOptions::default(), &mut page).stats;
                     assert_eq!(stats.dropped, 0, "{pose:?}");
                 });
             }

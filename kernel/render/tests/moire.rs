@@ -8,7 +8,7 @@
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::depth::nearest;
-use render::{RenderMemory, SceneRenderer};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::Pose;
 use scene::catalogue::{Entry, MAX_TEXELS};
 use texmap::plane::Form;
@@ -84,8 +84,11 @@ fn errors(
     means: &[Option<[f64; 3]>],
 ) -> Vec<Option<[f64; 3]>> {
     let mut page = PlanarBuffer::new();
-    stage.set_mapper(Mapper::Exact);
-    stage.draw(pose, &mut page);
+    let options = RenderOptions {
+        mapper: Mapper::Exact,
+        ..RenderOptions::default()
+    };
+    stage.draw(pose, options, &mut page);
     let error = |(i, mean): (usize, &Option<[f64; 3]>)| {
         let colour = stage.palette()[usize::from(page.pixel(i % WIDTH, i / WIDTH))];
         mean.map(|mean| [0, 1, 2].map(|k| f64::from(colour[k]) - mean[k]))

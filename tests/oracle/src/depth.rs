@@ -10,9 +10,9 @@ use std::ops::Range;
 
 use fastrand::Rng;
 use modex::{HEIGHT, WIDTH};
-use render::{RenderMemory, SceneRenderer};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::{FOCAL_LENGTH, Pose, Vec3};
-use texmap::{Face, Mapper, Order, Point};
+use texmap::{Face, Point};
 
 use crate::coverage::{Area, Pixels};
 use crate::solid::{Count, Solid};
@@ -78,7 +78,7 @@ pub struct Compared {
     pub borders: u64,
 }
 
-/// Compares the visible face at each pixel, and how often each pixel is written when `mapper` maps it.
+/// Compares the visible face at each pixel, and how often each pixel is written when the frame is drawn with `options`.
 ///
 /// # Errors
 /// A description of the first difference.
@@ -86,13 +86,10 @@ pub fn check(
     storage: &mut RenderMemory,
     solid: &Solid,
     pose: &Pose,
-    mapper: Mapper,
-    order: Order,
+    options: RenderOptions,
 ) -> Result<Compared, String> {
     let mut count = Count::default();
     solid.on_stage(storage, |stage| {
-        stage.set_mapper(mapper);
-        stage.set_order(order);
         let nearest = sorted(stage, pose);
         let visible = stage.find_visible(pose);
         let mut compared = Compared::default();
@@ -120,7 +117,7 @@ pub fn check(
         let below =
             |i: usize| found[i].is_some() && found.get(i + WIDTH).is_some_and(|b| *b != found[i]);
         compared.borders = (0..found.len()).filter(|&i| below(i)).count() as u64;
-        let stats = count.redraw(stage, pose);
+        let stats = count.redraw(stage, pose, options);
         if u64::from(stats.pixels) != compared.pixels {
             return Err(format!(
                 "{} pixels were written of {}",

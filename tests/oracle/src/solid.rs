@@ -8,7 +8,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use fastrand::Rng;
 use in_place::InPlace;
 use modex::{Destination, HEIGHT, Lane, Palette, PlanarBuffer, STRIDE, WIDTH};
-use render::{RenderMemory, SceneRenderer};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::{
     Corner, FOCAL_LENGTH, LIGHT_LEVELS, LightTable, Mesh, MeshFace, NEAR, Pose, Scene, Vec3,
 };
@@ -245,13 +245,20 @@ impl Count {
 
     /// Clears the counts and draws a solid.
     pub fn draw(&mut self, storage: &mut RenderMemory, solid: &Solid, pose: &Pose) -> Stats {
-        solid.on_stage(storage, |stage| self.redraw(stage, pose))
+        solid.on_stage(storage, |stage| {
+            self.redraw(stage, pose, RenderOptions::default())
+        })
     }
 
     /// Clears the counts and draws a stage's solid.
-    pub fn redraw(&mut self, stage: &mut SceneRenderer<'_>, pose: &Pose) -> Stats {
+    pub fn redraw(
+        &mut self,
+        stage: &mut SceneRenderer<'_>,
+        pose: &Pose,
+        options: RenderOptions,
+    ) -> Stats {
         self.times.fill(0);
-        stage.draw(pose, self)
+        stage.draw(pose, options, self).stats
     }
 }
 
