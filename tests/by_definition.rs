@@ -89,7 +89,7 @@ fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expec
     };
     let mut seen = Vec::new();
     let nearest = depth::nearest(stage, pose);
-    stage.polygons(pose, |number, drawn| {
+    stage.at(pose).faces(|number, drawn| {
         let drawn = drawn.expect("nothing legal is dropped");
         seen.push((number, drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });

@@ -265,12 +265,12 @@ impl<'a, B: Bus> Bench<'a, B> {
                 }
             }),
             Work::FrameFaces => ticks(now, &mut || {
-                self.stage.polygons(&self.pose, |_, face| {
+                self.stage.at(&self.pose).faces(|_, face| {
                     black_box(&face);
                 });
             }),
             Work::FrameJobs => ticks(now, &mut || {
-                self.stage.polygons(&self.pose, |_, face| {
+                self.stage.at(&self.pose).faces(|_, face| {
                     let made = face.map(|face| {
                         mapper.jobs(&face, &self.ball, |job| {
                             black_box(&job);

@@ -422,7 +422,7 @@ impl<'a, B: Bus> Show<'a, B> {
             map_masks: counts.draw.map_mask + counts.erase.map_mask,
         };
         self.overlay.prepare(tick, &figures, || {
-            stage.motion(&state.pose(tick), &state.next_pose(tick))
+            stage.at(&state.pose(tick)).motion(&state.next_pose(tick))
         })
     }
 

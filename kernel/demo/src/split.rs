@@ -84,11 +84,12 @@ impl Split {
             next: None,
             ..options
         };
-        stage.draw(pose, exact, &mut Window::new(destination, COLUMNS, middle));
+        let mut posed = stage.at(pose);
+        posed.draw(exact, &mut Window::new(destination, COLUMNS, middle));
         let colour = |error| self.heat[step(error)];
         let mut window = Window::new(destination, COLUMNS, right);
-        let most = stage.draw_errors(pose, options, COLUMNS, colour, &mut window);
-        let drawn = stage.draw(pose, options, &mut Window::new(destination, COLUMNS, left));
+        let most = posed.draw_errors(options, COLUMNS, colour, &mut window);
+        let drawn = posed.draw(options, &mut Window::new(destination, COLUMNS, left));
         (drawn, most)
     }
 

@@ -4,73 +4,59 @@ use core::ops::Range;
 
 use modex::{Destination, HEIGHT};
 use texmap::Job;
-use texmap::plane::coordinate;
+use texmap::plane::{Form, coordinate};
 
-use scene::Pose;
+use crate::quality::MapperChoice;
+use crate::{PosedScene, RenderOptions};
 
-use crate::motion::MapperChoice;
-use crate::renderer::{lit, polygons};
-use crate::{RenderOptions, SceneRenderer};
-
-impl SceneRenderer<'_> {
-    /// Draws the solid as [`SceneRenderer::draw`] does, but colours each pixel by the mapper's error there: the
+impl PosedScene<'_> {
+    /// Draws the solid as [`PosedScene::draw`] does, but colours each pixel by the mapper's error there: the
     /// larger of the differences in u and v from the exact quotients, in 2^-16 texel. Columns outside
     /// `columns` may be left out. Returns the largest error in `columns`.
     ///
     /// The spans are always drawn polygon by polygon: this view shows errors, not costs.
     pub fn draw_errors(
-        &mut self,
-        pose: &Pose,
+        &self,
         options: RenderOptions,
         columns: Range<u16>,
         colour: impl Fn(u32) -> u8,
         destination: &mut impl Destination,
     ) -> u32 {
-        if !self.mesh.convex {
-            self.find_visible(pose);
-        }
-        let visible = &*self.visible;
-        let choice = MapperChoice::new(&options, pose);
+        let choice = MapperChoice::new(&options, &self.pose);
         let mut most = 0;
-        polygons(
-            &self.mesh,
-            self.mipmaps,
-            self.points,
-            pose,
-            |face_number, face| {
-                let Some(face) = face else { return };
-                let texture = lit(&self.surfaces, self.texels, face.texture);
-                let plane = face.plane();
-                let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
-                    let c = plane.c.at(x, y);
-                    let off = |found: i32, form: texmap::plane::Form, size: u16| {
-                        found.abs_diff(coordinate(form.at(x, y), c, size))
-                    };
-                    off(u, plane.a, texture.width()).max(off(v, plane.b, texture.height()))
+        self.faces.each(|number, face| {
+            let Some(face) = face else { return };
+            let texture = self.faces.surfaces.texture(face.texture);
+            let plane = face.plane();
+            let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
+                let c = plane.c.at(x, y);
+                let off = |found: i32, form: Form, size: u16| {
+                    found.abs_diff(coordinate(form.at(x, y), c, size))
                 };
-                let mut draw = |job: Job| {
-                    if job.is_column() && !columns.contains(&job.x) {
-                        return;
+                off(u, plane.a, texture.width()).max(off(v, plane.b, texture.height()))
+            };
+            let mut draw = |job: Job| {
+                if job.is_column() && !columns.contains(&job.x) {
+                    return;
+                }
+                let mut strip = Strip::new();
+                job.pixels(&texture, |place, coordinates| {
+                    let error = error(place, coordinates);
+                    if columns.contains(&place.0) {
+                        most = most.max(error);
                     }
-                    let mut run = Strip::new();
-                    job.pixels(&texture, |place, coordinates| {
-                        let error = error(place, coordinates);
-                        if columns.contains(&place.0) {
-                            most = most.max(error);
-                        }
-                        run.push(place, colour(error), destination);
-                    });
-                    run.draw(destination);
-                };
-                // A face outside the legal range is not drawn in a normal frame either.
-                let _ = choice
-                    .mapper(&face)
-                    .jobs(&face, &texture, |job| match self.mesh.convex {
-                        true => draw(job),
-                        false => visible.cut(face_number, &job, &mut draw),
-                    });
-            },
-        );
+                    strip.push(place, colour(error), destination);
+                });
+                strip.draw(destination);
+            };
+            // A face outside the legal range is not drawn in a normal frame either.
+            let _ = choice
+                .mapper(&face)
+                .jobs(&face, &texture, |job| match self.visible {
+                    None => draw(job),
+                    Some(visible) => visible.cut(number, &job, &mut draw),
+                });
+        });
         most
     }
 }
@@ -142,14 +128,15 @@ mod tests {
             mapper: Mapper::parse(mapper).unwrap(),
             ..RenderOptions::default()
         };
+        let mut posed = stage.at(pose);
         let mut drawn = Box::new(PlanarBuffer::new());
-        let stats = stage.draw(pose, options, &mut *drawn).stats;
+        let stats = posed.draw(options, &mut *drawn).stats;
         let mut page = Box::new(PlanarBuffer::new());
-        let found = stage.draw_errors(pose, options, 0..WIDTH as u16, |_| 1, &mut *page);
+        let found = posed.draw_errors(options, 0..WIDTH as u16, |_| 1, &mut *page);
         let with = page.planes.as_flattened().iter().filter(|&&byte| byte == 1);
         assert_eq!(with.count(), stats.pixels as usize);
         // The largest error of a part is at most that of the whole.
-        assert!(stage.draw_errors(pose, options, 108..212, |_| 0, &mut *page) <= found);
+        assert!(posed.draw_errors(options, 108..212, |_| 0, &mut *page) <= found);
         found
     }
 

@@ -4,6 +4,11 @@
 
 mod errors;
 pub mod motion;
+mod posed;
+mod quality;
 mod renderer;
+mod surfaces;
 
-pub use renderer::{Drawn, MAX_JOBS, RenderMemory, RenderOptions, SURFACE_BYTES, SceneRenderer};
+pub use posed::{Drawn, PosedScene, RenderOptions};
+pub use renderer::{MAX_JOBS, RenderMemory, SceneRenderer};
+pub use surfaces::SURFACE_BYTES;

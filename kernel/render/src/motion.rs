@@ -31,15 +31,14 @@
 //! wave of w radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
 
 use modex::{HEIGHT, Palette, WIDTH};
-use texmap::coverage::{Axis, spans};
-use texmap::plane::{Anchor, Plane, coordinate};
-use texmap::{Face, Mapper, Texture};
-
 use scene::trig::sin;
-use scene::{FOCAL_LENGTH, Orientation, Pose, Vec3};
+use scene::{FOCAL_LENGTH, Pose};
+use texmap::Texture;
+use texmap::coverage::{Axis, spans};
+use texmap::plane::{Plane, coordinate};
 
-use crate::renderer::{lit, polygons};
-use crate::{RenderOptions, SceneRenderer};
+use crate::PosedScene;
+use crate::quality::PoseChange;
 
 /// Images a second that the eye still sees one by one, not as motion. (P. Read and M.-P. Meyer, Restoration
 /// of Motion Picture Film, 2000: 10 to 12.)
@@ -66,97 +65,6 @@ impl TextureMotion {
         let least = u64::from(STEPS_A_SECOND) * u64::from(ticks) / u64::from(ticks_a_second);
         let most = (u64::from(self.pixels) << 16).checked_div(u64::from(self.part))?;
         Some((least as u32, most.min(u64::from(u32::MAX)) as u32))
-    }
-}
-
-/// The motion from one pose of the solid to another.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PoseChange {
-    from: (Orientation, i32),
-    to: (Orientation, i32),
-}
-
-impl PoseChange {
-    pub fn new(from: &Pose, to: &Pose) -> Self {
-        let [from, to] = [from, to].map(|pose| (pose.orientation(), pose.distance));
-        Self { from, to }
-    }
-
-    /// The place to which a point of view space moves, to within some 2^-16 unit.
-    fn point(&self, [x, y, z]: Vec3) -> Vec3 {
-        let (from, to) = (&self.from, &self.to);
-        let [x, y, z] = to.0.turn(from.0.turn_back([x, y, z - from.1]));
-        [x, y, z + to.1]
-    }
-
-    fn anchors(&self, anchors: &[Anchor; 3]) -> [Anchor; 3] {
-        anchors.map(|anchor| Anchor {
-            position: self.point(anchor.position),
-            ..anchor
-        })
-    }
-
-    /// Whether the motion hides a mapper's errors in a face's texture: one of the face's points moves by half
-    /// a pixel or more, and the face does not move in its own plane. In its own plane the texture glides on
-    /// unchanged, and the eye sees a bend that stands still in the texture.
-    pub fn hides_errors(&self, anchors: &[Anchor; 3]) -> bool {
-        let places = anchors.map(|anchor| anchor.position.map(i64::from));
-        let ways = anchors.map(|anchor| {
-            let to = self.point(anchor.position);
-            [0, 1, 2].map(|k| i64::from(to[k]) - i64::from(anchor.position[k]))
-        });
-        // A point beside or behind the eye has no place on the screen, and it moves fast when it comes into
-        // view.
-        let moves = places.iter().zip(&ways).any(|(place, way)| {
-            2 * i64::from(FOCAL_LENGTH) * way[0].abs().max(way[1].abs()) >= place[2]
-        });
-        let [a, b] = [1, 2].map(|i| [0, 1, 2].map(|k| places[i][k] - places[0][k]));
-        let cross = [1, 2, 0].map(|i| {
-            let j = (i + 1) % 3;
-            a[i] * b[j] - a[j] * b[i]
-        });
-        // The cross product's entries are below 2^51, and below 2^24 after the shift. The square of such an
-        // entry times the square of a `way`, below 2^26, then fits.
-        let largest = cross
-            .iter()
-            .fold(0, |most, k: &i64| most.max(k.unsigned_abs()));
-        let shift = (64 - largest.leading_zeros()).saturating_sub(24);
-        let normal = cross.map(|k| i128::from(k >> shift));
-        let dot = |a: [i128; 3], b: [i128; 3]| (0..3).map(|k| a[k] * b[k]).sum::<i128>();
-        let ways = ways.map(|way| way.map(i128::from));
-        let out: i128 = ways.iter().map(|&way| dot(way, normal).pow(2)).sum();
-        let all: i128 = ways.iter().map(|&way| dot(way, way)).sum();
-        // The sine of seven degrees is an eighth.
-        moves && 64 * out > all * dot(normal, normal)
-    }
-}
-
-/// Chooses the mapper of each face.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct MapperChoice {
-    /// The mapper in full quality.
-    full: Mapper,
-    /// The faster mapper, and the motion that hides its errors.
-    reduced: Option<(Mapper, PoseChange)>,
-}
-
-impl MapperChoice {
-    /// The mappers of a frame of `pose`.
-    pub fn new(options: &RenderOptions, pose: &Pose) -> Self {
-        let next = options.next.filter(|next| next != pose);
-        let reduced = options.mapper.lower().zip(next);
-        Self {
-            full: options.mapper,
-            reduced: reduced.map(|(reduced, next)| (reduced, PoseChange::new(pose, &next))),
-        }
-    }
-
-    /// The mapper for a face.
-    pub fn mapper(&self, face: &Face<'_>) -> Mapper {
-        match &self.reduced {
-            Some((reduced, change)) if change.hides_errors(&face.anchors) => *reduced,
-            _ => self.full,
-        }
     }
 }
 
@@ -204,50 +112,42 @@ pub(crate) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
     Some(((1u64 << 46) / u64::from(angle.max(1))).min(1 << 31) as u32)
 }
 
-impl SceneRenderer<'_> {
-    /// Returns how the visible texture in `pose` moves to `next`, or `None` if too little of it is visible.
-    pub fn motion(&mut self, pose: &Pose, next: &Pose) -> Option<TextureMotion> {
-        if !self.mesh.convex {
-            self.find_visible(pose);
-        }
-        let visible = &*self.visible;
-        let half_period = self.half_period?;
-        let moved = PoseChange::new(pose, next);
+impl PosedScene<'_> {
+    /// Returns how the visible texture moves from this pose to `next`, or `None` if too little of it is visible.
+    pub fn motion(&self, next: &Pose) -> Option<TextureMotion> {
+        let surfaces = self.faces.surfaces;
+        let half_period = surfaces.half_period()?;
+        let change = PoseChange::new(&self.pose, next);
         let (mut pixels, mut parts) = ([0; SAMPLES], [0; SAMPLES]);
         let mut count = 0;
-        polygons(
-            &self.mesh,
-            self.mipmaps,
-            self.points,
-            pose,
-            |number, face| {
-                let Some(face) = face else { return };
-                let texture = lit(&self.surfaces, self.texels, face.texture);
-                let size = (texture.width(), texture.height());
-                let before = face.plane();
-                let after = Plane::new(&moved.anchors(&face.anchors), FOCAL_LENGTH);
-                // A face outside the legal range is not visible.
-                let _ = spans(Axis::Down, face.polygon, |run| {
-                    if run.line % GRID != GRID / 2 {
-                        return;
+        self.faces.each(|number, face| {
+            let Some(face) = face else { return };
+            let texture = surfaces.texture(face.texture);
+            let size = (texture.width(), texture.height());
+            let before = face.plane();
+            let after = Plane::new(&change.anchors(&face.anchors), FOCAL_LENGTH);
+            // A face outside the legal range is not visible.
+            let _ = spans(Axis::Down, face.polygon, |run| {
+                if run.line % GRID != GRID / 2 {
+                    return;
+                }
+                for y in (run.first..run.first + run.len).filter(|y| y % GRID == GRID / 2) {
+                    let x = run.line;
+                    let seen = self
+                        .visible
+                        .is_none_or(|visible| visible.at(x, y) == Some(number));
+                    if let Some((pixel, texel)) = sample(&before, &after, size, x, y)
+                        && seen
+                        && count < SAMPLES
+                    {
+                        pixels[count] = pixel;
+                        parts[count] = ((u64::from(texel) << 16) / u64::from(half_period))
+                            .min(u64::from(u32::MAX)) as u32;
+                        count += 1;
                     }
-                    for y in (run.first..run.first + run.len).filter(|y| y % GRID == GRID / 2) {
-                        let x = run.line;
-                        let seen = self.mesh.convex || visible.at(x, y) == Some(number);
-                        if let Some((pixel, texel)) = sample(&before, &after, size, x, y)
-                            && seen
-                            && count < SAMPLES
-                        {
-                            pixels[count] = pixel;
-                            parts[count] = ((u64::from(texel) << 16) / u64::from(half_period))
-                                .min(u64::from(u32::MAX))
-                                as u32;
-                            count += 1;
-                        }
-                    }
-                });
-            },
-        );
+                }
+            });
+        });
         let median = |values: &mut [u32]| *values.select_nth_unstable(values.len() / 2).1;
         (count > 0).then(|| TextureMotion {
             pixels: median(&mut pixels[..count]),
@@ -291,10 +191,11 @@ fn sample(before: &Plane, after: &Plane, size: (u16, u16), x: u16, y: u16) -> Op
 mod tests {
     extern crate std;
     use super::*;
-    use crate::RenderMemory;
+    use crate::{RenderMemory, RenderOptions, SceneRenderer};
     use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
     use std::boxed::Box;
     use std::vec::Vec;
+    use texmap::Mapper;
 
     /// A grey ramp.
     fn greys() -> Palette {
@@ -364,10 +265,10 @@ mod tests {
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let unit = |n: i32| f64::from(n) / 65_536.0;
         let focal = f64::from(FOCAL_LENGTH);
-        let convex = stage.mesh.convex;
         let mut faces = std::collections::HashMap::new();
         let mut at = std::collections::HashMap::new();
-        stage.polygons(pose, |number, face| {
+        let posed = stage.at(pose);
+        posed.faces(|number, face| {
             let Some(face) = face else { return };
             let [a, b, c] = face.anchors.map(|anchor| anchor.position.map(unit));
             let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
@@ -381,8 +282,7 @@ mod tests {
                 }
             });
         });
-        if !convex {
-            let visible = stage.find_visible(pose);
+        if let Some(visible) = posed.visible() {
             at.retain(|&(x, y), number| {
                 visible.at(x, y).is_some_and(|seen| {
                     *number = seen;
@@ -420,7 +320,7 @@ mod tests {
             let (mut pixels, mut ends) = (Vec::new(), Vec::new());
             for tick in (0..720).step_by(48) {
                 let (pose, next) = (entry.pose(tick), entry.pose(tick + 1));
-                let motion = stage.motion(&pose, &next).unwrap();
+                let motion = stage.at(&pose).motion(&next).unwrap();
                 let found = f64::from(motion.pixels) / 65_536.0;
                 let rays = median_by_rays(stage, &pose, &next);
                 let near = (found - rays).abs() < 0.03 + rays / 20.0;

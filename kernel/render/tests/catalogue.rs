@@ -41,7 +41,7 @@ fn every_frame_is_whole_and_shows_its_scene() {
 fn the_wall_has_one_depth_in_each_column() {
     staged("wall", |entry, stage| {
         for tick in TICKS {
-            stage.polygons(&entry.pose(tick), |_, face| {
+            stage.at(&entry.pose(tick)).faces(|_, face| {
                 let plane = face.unwrap().plane();
                 assert_eq!((plane.a.down, plane.c.down), (0, 0), "at {tick}");
                 assert_ne!(plane.c.right, 0, "at {tick}");

@@ -34,7 +34,7 @@ fn on_stage<T>(name: &str, look: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)
 fn means(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
     let seen = nearest(stage, pose);
     let mut faces = Vec::new();
-    stage.polygons(pose, |number, face| {
+    stage.at(pose).faces(|number, face| {
         let face = face.unwrap();
         faces.push((number, face.plane(), face.texture));
     });

@@ -91,7 +91,8 @@ pub fn check(
     let mut count = Count::default();
     solid.on_stage(storage, |stage| {
         let nearest = sorted(stage, pose);
-        let visible = stage.find_visible(pose);
+        let posed = stage.at(pose);
+        let visible = posed.visible().expect("the solid is not convex");
         let mut compared = Compared::default();
         let mut found = Vec::new();
         for i in 0..WIDTH * HEIGHT {
@@ -144,7 +145,7 @@ pub fn nearest(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<u16>> {
 fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
     let mut at = vec![Vec::new(); WIDTH * HEIGHT];
     let mut covered = Pixels::default();
-    stage.polygons(pose, |number, face| {
+    stage.at(pose).faces(|number, face| {
         let Some(Face {
             polygon, anchors, ..
         }) = face

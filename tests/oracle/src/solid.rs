@@ -661,7 +661,7 @@ impl Checker {
         let mut drawn = Vec::new();
         let mut dropped = 0;
         solid.on_stage(&mut self.storage, |stage| {
-            stage.polygons(pose, |_, face| match face {
+            stage.at(pose).faces(|_, face| match face {
                 Some(face) => drawn.push((
                     face.anchors.map(|anchor| anchor.position),
                     face.polygon
@@ -754,7 +754,7 @@ const ROUNDED: f64 = 2.0 * 1.733;
 fn is_in_fold(storage: &mut RenderMemory, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
     let mut covering = Vec::new();
     solid.on_stage(storage, |stage| {
-        stage.polygons(pose, |_, drawn| {
+        stage.at(pose).faces(|_, drawn| {
             let drawn = drawn.into_iter();
             covering.extend(drawn.filter_map(|drawn| {
                 let polygon: Vec<Point> = drawn.polygon.iter().map(|&v| v.into()).collect();

@@ -81,7 +81,9 @@ impl<'a> Subject<'a> {
         let mut frames = Vec::new();
         for pose in poses {
             let mut faces = Vec::new();
-            stage.polygons(pose, |_, face| faces.extend(face.as_ref().map(Owned::new)));
+            stage
+                .at(pose)
+                .faces(|_, face| faces.extend(face.as_ref().map(Owned::new)));
             frames.push(faces);
         }
         let stage: &'a SceneRenderer<'_> = stage;
