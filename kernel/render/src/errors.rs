@@ -1,4 +1,7 @@
-//! Frames that show the errors of mappers.
+//! The error view: a frame that shows each pixel's error in the place of its texel.
+//!
+//! The view asks the mapper itself for the coordinates of each pixel that it would draw, so it shows the
+//! errors of the frame, and of no model of the mapper.
 
 use core::ops::Range;
 

@@ -113,7 +113,8 @@ pub(crate) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
 }
 
 impl PosedScene<'_> {
-    /// Returns how the visible texture moves from this pose to `next`, or `None` if too little of it is visible.
+    /// Returns how the visible texture moves from this pose to `next`, or `None` if too little of it is
+    /// visible.
     pub fn motion(&self, next: &Pose) -> Option<TextureMotion> {
         let surfaces = self.faces.surfaces;
         let half_period = surfaces.half_period()?;
@@ -236,7 +237,7 @@ mod tests {
 
     /// Calls `check` with each scene's entry and a stage of it.
     fn staged(mut check: impl FnMut(&Entry<'_>, &mut SceneRenderer<'_>)) {
-        for entry in &CATALOGUE {
+        for entry in CATALOGUE {
             let mut texels = Box::new([0; MAX_TEXELS]);
             let textures = entry.paint(&mut texels);
             let mut storage = in_place::boxed!(RenderMemory);

@@ -1,7 +1,8 @@
 //! A scene in a pose: its front faces on the screen, and which of them is visible at each pixel.
 //!
-//! Every frame of a pose, exact or fast, in colours or as errors, is made of the same faces. So the vertices are turned
-//! and projected once, and the hidden surfaces are found once, however many frames of the pose are drawn.
+//! Every frame of a pose, exact or fast, in colours or as errors, is made of the same faces. So the vertices
+//! are turned and projected once, and the hidden surfaces are found once, however many frames of the pose are
+//! drawn.
 
 use modex::Destination;
 use scene::clip::{ViewPoint, place};
@@ -20,8 +21,8 @@ pub struct RenderOptions {
     pub mapper: Mapper,
     /// The order in which the spans are drawn.
     pub order: Order,
-    /// The pose one tick after the drawn pose. A face whose motion to this pose hides a mapper's errors is drawn
-    /// in reduced quality, by a faster mapper. `None` draws every face in full quality.
+    /// The pose one tick after the drawn pose. A face whose motion to this pose hides a mapper's errors is
+    /// drawn in reduced quality, by a faster mapper. `None` draws every face in full quality.
     pub next: Option<Pose>,
 }
 
@@ -45,7 +46,8 @@ pub struct PosedScene<'r> {
 }
 
 impl<'r> PosedScene<'r> {
-    /// Turns and projects the vertices of `mesh` into `points`, and finds the visible faces if `mesh` is not convex.
+    /// Turns and projects the vertices of `mesh` into `points`, and finds the visible faces if `mesh` is not
+    /// convex.
     pub(crate) fn new(
         mesh: Mesh<'r>,
         surfaces: &'r Surfaces<'r>,
@@ -87,8 +89,8 @@ impl<'r> PosedScene<'r> {
         }
     }
 
-    /// Passes the front faces to `sink` in the mesh's order, each with its number in the mesh. `sink` receives `None`
-    /// for a dropped face.
+    /// Passes the front faces to `sink` in the mesh's order, each with its number in the mesh. `sink`
+    /// receives `None` for a dropped face.
     pub fn faces(&self, sink: impl FnMut(u16, Option<Face<'_>>)) {
         self.faces.each(sink);
     }
@@ -157,7 +159,8 @@ impl FrontFaces<'_> {
                 (vertex.u, vertex.v) = (vertex.u >> mip, vertex.v >> mip);
             }
             let level = lit_level(self.orientation.turn(face.normal));
-            // A third of the corners apart, so that the anchors of a face with many corners do not lie on a line.
+            // A third of the corners apart, so that the anchors of a face with many corners do not lie on a
+            // line.
             let anchors = [0, corners.len() / 3, 2 * corners.len() / 3].map(|i| Anchor {
                 position: points[usize::from(corners[i].vertex)].view(),
                 u: corners[i].u >> mip,

@@ -1,4 +1,8 @@
 //! Reduced quality: a face whose motion hides a mapper's errors is drawn by a faster mapper.
+//!
+//! A face that moves fast across the screen is seen for one frame in each place, so nobody sees by how much a
+//! faster mapper bends its texture. A face that moves within its own plane is the exception: its texture
+//! glides on unchanged, and a bend that stands still in the texture is visible.
 
 use scene::{FOCAL_LENGTH, Orientation, Pose, Vec3};
 use texmap::plane::Anchor;
@@ -19,7 +23,7 @@ impl PoseChange {
         Self { from, to }
     }
 
-    /// The place to which a point of view space moves, to within some 2^-16 unit.
+    /// Moves a point of view space, to within some 2^-16 unit.
     fn point(&self, [x, y, z]: Vec3) -> Vec3 {
         let (from, to) = (&self.from, &self.to);
         let [x, y, z] = to.0.turn(from.0.turn_back([x, y, z - from.1]));
@@ -35,8 +39,7 @@ impl PoseChange {
     }
 
     /// Whether the motion hides a mapper's errors in a face's texture: one of the face's points moves by half
-    /// a pixel or more, and the face does not move in its own plane. In its own plane the texture glides on
-    /// unchanged, and the eye sees a bend that stands still in the texture.
+    /// a pixel or more, and the face does not move in its own plane.
     pub fn hides_errors(&self, anchors: &[Anchor; 3]) -> bool {
         let places = anchors.map(|anchor| anchor.position.map(i64::from));
         let ways = anchors.map(|anchor| {

@@ -82,9 +82,9 @@ impl<'a> SceneRenderer<'a> {
     /// # Panics
     /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices; for a mesh that is not
     /// convex, more than [`MAX_FACES`] faces; more than 16 textures, each mipmap counted; or textures of more
-    /// than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`](scene::LIGHT_LEVELS) texels together, each padded to powers of two.
-    /// If a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further out than
-    /// [`MAX_EXTENT`].
+    /// than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`](scene::LIGHT_LEVELS) texels together, each padded to powers
+    /// of two. If a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further out
+    /// than [`MAX_EXTENT`].
     pub fn set(&mut self, scene: Scene<'a, '_>) {
         let (vertices, faces) = (scene.mesh.vertices.len(), scene.mesh.faces.len());
         assert!(

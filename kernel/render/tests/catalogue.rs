@@ -21,7 +21,7 @@ fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)) {
 
 #[test]
 fn every_frame_is_whole_and_shows_its_scene() {
-    for entry in &CATALOGUE {
+    for entry in CATALOGUE {
         staged(entry.name, |entry, stage| {
             for tick in TICKS {
                 let mut page = PlanarBuffer::new();

@@ -24,7 +24,7 @@ impl Entry<'static> {
 }
 
 /// Every built-in scene, the ball first.
-pub static CATALOGUE: [Entry<'static>; 10] = [
+pub static CATALOGUE: &[Entry<'static>] = &[
     ball::BALL,
     square::FACING,
     square::TILTED,
@@ -60,7 +60,7 @@ mod tests {
     #[test]
     fn names_are_plain_and_no_two_alike() {
         let mut known = HashSet::new();
-        for entry in &CATALOGUE {
+        for entry in CATALOGUE {
             let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-';
             assert!(entry.name.chars().all(plain), "{}", entry.name);
             assert!(known.insert(entry.name), "{}", entry.name);
@@ -74,7 +74,7 @@ mod tests {
     fn textures_are_shades_that_light_can_move() {
         let mut texels = Box::new([0; MAX_TEXELS]);
         let mut seen = HashSet::new();
-        for entry in &CATALOGUE {
+        for entry in CATALOGUE {
             for texture in entry.paint(&mut texels).iter() {
                 let ramp =
                     |&texel: &u8| usize::from(texel.wrapping_sub(Ramp::Violet.shade(0))) / SHADES;

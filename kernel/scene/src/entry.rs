@@ -13,8 +13,8 @@ use crate::{LightTable, Mesh, Pose};
 
 /// A mesh with its textures, colours and background.
 ///
-/// `'t` is the textures' lifetime. The renderer makes its own lit copies, so the textures need not outlive its
-/// set-up.
+/// `'t` is the textures' lifetime. The renderer makes its own lit copies, so the textures need not outlive
+/// its set-up.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene<'a, 't> {
     /// Name, for people.

@@ -4,6 +4,20 @@
 //! [`Pose::at_tick`] makes the pose of a frame number. The crate `render` draws the frame.
 //!
 //! All arithmetic is in integers and fixed point, so the host and the bare machine produce the same bits.
+//!
+//! ```
+//! use scene::catalogue::{Entry, MAX_TEXELS};
+//!
+//! let cube = Entry::parse("cube").unwrap();
+//! let mut texels = Box::new([0; MAX_TEXELS]);
+//! let textures = cube.paint(&mut texels);
+//! let scene = cube.scene(&textures);
+//! assert_eq!((scene.mesh.faces.len(), scene.textures.len()), (6, 1));
+//! // Frame 0 is the scene at its pose of tick 0, and the nearest corner is in front of the eye.
+//! let pose = cube.pose(0);
+//! let depths = scene.mesh.vertices.iter().map(|&vertex| pose.orientation().turn(vertex)[2] + pose.distance);
+//! assert!(depths.min().unwrap() > scene::NEAR);
+//! ```
 #![no_std]
 #![forbid(unsafe_code)]
 
