@@ -25,7 +25,7 @@
 //!
 //! # The arithmetic
 //!
-//! A corner has [`FINE`] more fraction bits than a vertex of the mesh: below 2^52 in size. Its height above a
+//! A corner has `FINE` more fraction bits than a vertex of the mesh: below 2^52 in size. Its height above a
 //! plane is exact and below 2^68; a crossing's product stays below 2^122. A crossing is rounded to 2^-44 unit
 //! (half up). On the screen that error is largest where z is least and x / z most: (258 x 256 / NEAR) (1 +
 //! 128) 2^-29, less than 1/8000 of 1/256 pixel. The guard band ends on a whole number of 1/256 pixels, so
