@@ -10,8 +10,9 @@ use oracle::coverage::inside;
 use oracle::depth;
 use oracle::solid::{self, Checker, Compared, Solid};
 use oracle::texel::{affine, perspective};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
-use scene::{FOCAL_LENGTH, Pose, Stage, Storage};
+use scene::{FOCAL_LENGTH, Pose};
 use texmap::loops::Loop;
 use texmap::{Face, Mapper, Point, Texture};
 
@@ -78,7 +79,7 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
         .collect()
 }
 
-fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
+fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expected {
     let (background, convex) = (stage.background(), stage.is_convex());
     let mut expected = Expected {
         colours: (0..WIDTH * HEIGHT)
@@ -88,7 +89,7 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
     };
     let mut seen = Vec::new();
     let nearest = depth::nearest(stage, pose);
-    stage.polygons(pose, |number, drawn| {
+    stage.at(pose).faces(|number, drawn| {
         let drawn = drawn.expect("nothing legal is dropped");
         seen.push((number, drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });
@@ -162,8 +163,8 @@ fn compare_coverage(
 fn every_golden_is_what_the_oracle_draws() {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = CATALOGUE[0].paint(&mut texels);
-    let mut storage = in_place::boxed!(Storage);
-    let mut stage = Stage::new(&mut storage, CATALOGUE[0].scene(&textures));
+    let mut storage = in_place::boxed!(RenderMemory);
+    let mut stage = SceneRenderer::new(&mut storage, CATALOGUE[0].scene(&textures));
     let mut between = 0;
     for golden in golden::find(&golden_folder()).unwrap() {
         let entry = scene(&golden);
@@ -192,9 +193,11 @@ fn every_golden_is_what_the_oracle_draws() {
         let exact = expected(&mut stage, &pose, Mapper::Exact);
         let mut page = Box::new(PlanarBuffer::new());
         page.clear(background);
-        stage.set_mapper(Mapper::Exact);
-        let stats = stage.draw(&pose, &mut *page);
-        stage.set_mapper(Mapper::default());
+        let options = RenderOptions {
+            mapper: Mapper::Exact,
+            ..RenderOptions::default()
+        };
+        let stats = stage.draw(&pose, options, &mut *page).stats;
         assert_eq!(stats.dropped, 0, "{}", golden.name);
         let name = format!("{} by the exact mapper", golden.name);
         compare(&name, &exact, |i| page.pixel(i % WIDTH, i / WIDTH));

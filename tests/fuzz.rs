@@ -18,8 +18,9 @@ use import::{Model, obj, solid, texture};
 use in_place::InPlace;
 use model::{Arena, MAX_BYTES, ModelFile, Parts};
 use modex::PlanarBuffer;
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::catalogue::{Colours, Entry, MAX_TEXELS};
-use scene::{MAX_EXTENT, Mesh, Pose, Stage, Storage};
+use scene::{MAX_EXTENT, Mesh, Pose};
 use texmap::{Mapper, Texture};
 
 /// The offset of a model file's counts, after magic, version, length and checksum.
@@ -39,7 +40,7 @@ impl Drop for Case {
 /// Memory for drawing, kept from case to case.
 struct Room {
     arena: InPlace<Arena>,
-    storage: InPlace<Storage>,
+    storage: InPlace<RenderMemory>,
     painted: Box<[u8; MAX_TEXELS]>,
     page: Box<PlanarBuffer>,
 }
@@ -48,7 +49,7 @@ impl Room {
     fn new() -> Self {
         Self {
             arena: in_place::boxed!(Arena),
-            storage: in_place::boxed!(Storage),
+            storage: in_place::boxed!(RenderMemory),
             painted: Box::new([0; MAX_TEXELS]),
             page: Box::new(PlanarBuffer::new()),
         }
@@ -58,8 +59,11 @@ impl Room {
     fn draw(&mut self, model_file: &ModelFile<'_>, random: &mut Rng) {
         let entry = model_file.entry(&mut self.arena);
         let textures = entry.paint(&mut self.painted);
-        let mut stage = Stage::new(&mut self.storage, entry.scene(&textures));
-        stage.set_mapper(Mapper::ALL[random.usize(..Mapper::ALL.len())].1);
+        let mut stage = SceneRenderer::new(&mut self.storage, entry.scene(&textures));
+        let options = RenderOptions {
+            mapper: Mapper::ALL[random.usize(..Mapper::ALL.len())].1,
+            ..RenderOptions::default()
+        };
         let mut pose = Pose {
             yaw: random.u32(..),
             pitch: random.u32(..),
@@ -69,7 +73,7 @@ impl Room {
         if random.u8(..8) == 0 {
             pose.distance = *random.choice(&[0, 1, Pose::MAX_DISTANCE]).unwrap();
         }
-        stage.draw(&pose, &mut *self.page);
+        stage.draw(&pose, options, &mut *self.page);
     }
 }
 

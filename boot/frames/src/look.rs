@@ -127,7 +127,7 @@ mod tests {
             assert_eq!(mapper.to_string(), name);
             assert!(Word::new(name).is_some(), "{name}");
         }
-        for entry in &CATALOGUE {
+        for entry in CATALOGUE {
             assert!(Word::new(entry.name).is_some(), "{}", entry.name);
         }
         assert_eq!(Named::<Order>::value_variants().len(), Order::ALL.len());

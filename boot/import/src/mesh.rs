@@ -12,7 +12,7 @@ use anyhow::ensure;
 use earcut::Earcut;
 use earcut::utils3d::project3d_to_2d;
 use model::MAX_ALL_CORNERS;
-use scene::{Corner, Face, MAX_CORNERS, MAX_FACES, Pose, Vec3};
+use scene::{Corner, MAX_CORNERS, MAX_FACES, MeshFace, Pose, Vec3};
 
 use crate::layout::Layout;
 use crate::obj::{BadLine, SIMPLIFY};
@@ -34,7 +34,7 @@ pub struct Solid {
     /// The corners, as in [`scene::Mesh`].
     pub corners: Vec<Corner>,
     /// The faces, as in [`scene::Mesh`], but with `first` left at zero.
-    pub faces: Vec<Face>,
+    pub faces: Vec<MeshFace>,
     /// What happened to the file's faces.
     pub tally: Tally,
 }
@@ -86,7 +86,7 @@ impl Solid {
             let mut add = |piece: &mut dyn Iterator<Item = usize>| {
                 let before = solid.corners.len();
                 solid.corners.extend(piece.map(|i| corners[i]));
-                solid.faces.push(Face {
+                solid.faces.push(MeshFace {
                     first: 0,
                     corners: (solid.corners.len() - before) as u16,
                     texture: 0,
@@ -273,7 +273,7 @@ mod tests {
     }
 
     /// Returns twice a face's area along its normal, in square units; negative if the face is inside out.
-    fn area(solid: &Solid, face: &Face, corners: &[Corner]) -> f64 {
+    fn area(solid: &Solid, face: &MeshFace, corners: &[Corner]) -> f64 {
         let at = |i: usize| solid.vertices[usize::from(corners[i].vertex)].map(f64::from);
         let sides =
             (1..corners.len() - 1).map(|i| cross(minus(at(i + 1), at(0)), minus(at(i), at(0))));

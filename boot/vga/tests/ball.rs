@@ -2,7 +2,8 @@
 
 use modex::registers::{CRTC, MAP_MASK, MODE_X, SEQUENCER, START_ADDRESS_HIGH};
 use modex::{Counted, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Purpose, WIDTH};
-use scene::{Pose, Stage, Storage};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
+use scene::Pose;
 use vga::Vga;
 
 #[test]
@@ -10,19 +11,21 @@ fn every_frame_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
     let mut texels = Box::new([0; scene::TEXELS]);
     let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);
-    let mut storage = in_place::boxed!(Storage);
-    let mut stage = Stage::new(&mut storage, scene);
+    let mut storage = in_place::boxed!(RenderMemory);
+    let mut stage = SceneRenderer::new(&mut storage, scene);
     let mut card = ModeX::set(Counted::new(Vga::new()), scene.palette).unwrap();
     let mut columns = 0;
     for frame in [0, 1000, u32::MAX, 360, 0] {
         let mut canvas = card.begin(scene.background);
-        let stats = stage.draw(&Pose::at_tick(frame), &mut canvas);
+        let stats = stage
+            .draw(&Pose::at_tick(frame), RenderOptions::default(), &mut canvas)
+            .stats;
         columns += u64::from(stats.columns);
         card.flip();
         card.settle();
         let mut page = Box::new(PlanarBuffer::new());
         page.clear(scene.background);
-        stage.draw(&Pose::at_tick(frame), &mut *page);
+        stage.draw(&Pose::at_tick(frame), RenderOptions::default(), &mut *page);
         let start = card.shown_page() * PAGE_BYTES;
         let vga = card.bus().inner();
         for (plane, bytes) in page.planes.iter().enumerate() {

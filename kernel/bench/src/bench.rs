@@ -5,7 +5,8 @@ use core::hint::black_box;
 
 use modex::{Bus, Destination, HEIGHT, ModeX, Offscreen, PlanarBuffer, SetError, WIDTH};
 use protocol::{Checksum, ERROR, Lines, OK};
-use scene::{Pose, Stage, Storage};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
+use scene::Pose;
 use texmap::{Job, JobList, Mapper, Order, Stats, Texture};
 
 use crate::request::{BenchRequest, Figure};
@@ -44,7 +45,7 @@ pub struct Clock {
 #[derive(Clone, Copy, Debug)]
 pub struct BenchMemory {
     ball: [u8; scene::TEXELS],
-    storage: Storage,
+    render: RenderMemory,
     square: [u8; screen::TEXELS],
     jobs: JobList<MAX_JOBS>,
     page: PlanarBuffer,
@@ -56,7 +57,7 @@ impl BenchMemory {
     pub const fn new() -> Self {
         Self {
             ball: [0; scene::TEXELS],
-            storage: Storage::new(),
+            render: RenderMemory::new(),
             square: [0; screen::TEXELS],
             jobs: JobList::new(),
             page: PlanarBuffer::new(),
@@ -75,7 +76,9 @@ impl Default for BenchMemory {
 #[derive(Debug)]
 pub struct Bench<'a, B> {
     card: ModeX<B>,
-    stage: Stage<'a>,
+    renderer: SceneRenderer<'a>,
+    /// The mapper and the order of the work.
+    options: RenderOptions,
     pose: Pose,
     /// The ball's texture in full light. Making jobs reads only a texture's sides, which are the same in
     /// every light.
@@ -95,11 +98,12 @@ impl<'a, B: Bus> Bench<'a, B> {
     /// As [`ModeX::set`].
     pub fn new(memory: &'a mut BenchMemory, bus: B) -> Result<Self, SetError> {
         let ball = [scene::paint_ball(&mut memory.ball)];
-        let stage = Stage::new(&mut memory.storage, scene::ball(&ball));
-        let card = ModeX::set(bus, stage.palette())?;
+        let renderer = SceneRenderer::new(&mut memory.render, scene::ball(&ball));
+        let card = ModeX::set(bus, renderer.palette())?;
         Ok(Self {
             card,
-            stage,
+            renderer,
+            options: RenderOptions::default(),
             pose: Pose::at_tick(FRAME),
             ball: ball[0],
             screen: Screen::new(),
@@ -192,8 +196,11 @@ impl<'a, B: Bus> Bench<'a, B> {
 
     /// Sets the mapper and the order of the work that follows.
     pub fn set(&mut self, mapper: Mapper, order: Order) {
-        self.stage.set_mapper(mapper);
-        self.stage.set_order(order);
+        self.options = RenderOptions {
+            mapper,
+            order,
+            next: None,
+        };
     }
 
     /// Prepares a piece of work, so that each repetition is the same.
@@ -203,10 +210,10 @@ impl<'a, B: Bus> Bench<'a, B> {
             // The card's pages may hold anything at first. With the ball on every page, each frame erases and
             // presents what the frame before it left.
             Work::Present => {
-                let background = self.stage.background();
+                let background = self.renderer.background();
                 for _ in 0..modex::PAGES {
                     self.offscreen.begin(background);
-                    self.stage.draw(&self.pose, self.offscreen);
+                    self.renderer.draw(&self.pose, self.options, self.offscreen);
                     self.card.present(self.offscreen);
                     self.card.flip();
                 }
@@ -220,8 +227,8 @@ impl<'a, B: Bus> Bench<'a, B> {
     /// # Panics
     /// If the mapper drops a face.
     pub fn run(&mut self, work: Work, now: fn() -> u64) -> u64 {
-        let (mapper, order) = (self.stage.mapper(), self.stage.order());
-        let background = self.stage.background();
+        let RenderOptions { mapper, order, .. } = self.options;
+        let background = self.renderer.background();
         let mut stats = Stats::default();
         let ticks = match work {
             Work::BareRam => ticks(now, &mut || bare(self.page)),
@@ -253,17 +260,20 @@ impl<'a, B: Bus> Bench<'a, B> {
             Work::FrameCard => ticks(now, &mut || {
                 for _ in 0..work.frames() {
                     let mut canvas = self.card.begin(background);
-                    stats = self.stage.draw(&self.pose, &mut canvas);
+                    stats = self
+                        .renderer
+                        .draw(&self.pose, self.options, &mut canvas)
+                        .stats;
                     self.card.flip();
                 }
             }),
             Work::FrameFaces => ticks(now, &mut || {
-                self.stage.polygons(&self.pose, |_, face| {
+                self.renderer.at(&self.pose).faces(|_, face| {
                     black_box(&face);
                 });
             }),
             Work::FrameJobs => ticks(now, &mut || {
-                self.stage.polygons(&self.pose, |_, face| {
+                self.renderer.at(&self.pose).faces(|_, face| {
                     let made = face.map(|face| {
                         mapper.jobs(&face, &self.ball, |job| {
                             black_box(&job);
@@ -275,7 +285,10 @@ impl<'a, B: Bus> Bench<'a, B> {
             Work::FrameDrawCard => {
                 let mut canvas = self.card.begin(background);
                 let ticks = ticks(now, &mut || {
-                    stats = self.stage.draw(&self.pose, &mut canvas);
+                    stats = self
+                        .renderer
+                        .draw(&self.pose, self.options, &mut canvas)
+                        .stats;
                 });
                 self.card.flip();
                 ticks
@@ -283,13 +296,19 @@ impl<'a, B: Bus> Bench<'a, B> {
             Work::FrameDrawRam => {
                 self.offscreen.begin(background);
                 ticks(now, &mut || {
-                    stats = self.stage.draw(&self.pose, self.offscreen);
+                    stats = self
+                        .renderer
+                        .draw(&self.pose, self.options, self.offscreen)
+                        .stats;
                 })
             }
             Work::FramePresented => ticks(now, &mut || {
                 for _ in 0..work.frames() {
                     self.offscreen.begin(background);
-                    stats = self.stage.draw(&self.pose, self.offscreen);
+                    stats = self
+                        .renderer
+                        .draw(&self.pose, self.options, self.offscreen)
+                        .stats;
                     self.card.present(self.offscreen);
                     self.card.flip();
                 }
@@ -327,7 +346,7 @@ impl<'a, B: Bus> Bench<'a, B> {
 
     /// Measures a face whose spans are all `length` pixels long: making its jobs, and drawing them in RAM.
     fn measure_spans(&mut self, length: u16, rounds: usize, now: fn() -> u64) -> [Figure; 2] {
-        let (mapper, order) = (self.stage.mapper(), self.stage.order());
+        let RenderOptions { mapper, order, .. } = self.options;
         let Self {
             screen,
             square,
@@ -360,13 +379,16 @@ impl<'a, B: Bus> Bench<'a, B> {
     }
 
     fn make_screen_jobs(&mut self) {
-        let mapper = self.stage.mapper();
+        let mapper = self.options.mapper;
         make_jobs(&self.screen, mapper, &self.square, self.jobs);
     }
 
     fn pixels_of_the_ball(&mut self) -> usize {
-        self.offscreen.begin(self.stage.background());
-        self.stage.draw(&self.pose, self.offscreen).pixels as usize
+        self.offscreen.begin(self.renderer.background());
+        self.renderer
+            .draw(&self.pose, self.options, self.offscreen)
+            .stats
+            .pixels as usize
     }
 
     /// Returns the CRC-32 of the frame in a target, pixel by pixel from the top left.

@@ -116,7 +116,7 @@ impl<B: Bus> Demo<'_, B> {
             pixels,
             dropped,
             full,
-        } = self.presentation.stats;
+        } = self.presentation.drawn.stats;
         out(format_args!(
             "frame polygons {polygons} columns {columns} pixels {pixels} dropped {dropped} full {full}"
         ));

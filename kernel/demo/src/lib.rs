@@ -59,7 +59,7 @@ use core::fmt;
 use model::{Arena, ModelFile};
 use modex::{Bus, Offscreen, SetError};
 use protocol::{Command, ERROR, FailKind, FrameName, Lines, RUNNING, Reception};
-use scene::Storage;
+use render::RenderMemory;
 use scene::catalogue::MAX_TEXELS;
 
 pub use frame::pose;
@@ -83,7 +83,7 @@ pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 pub struct DemoMemory {
     model: Arena,
     texels: [u8; MAX_TEXELS],
-    storage: Storage,
+    render: RenderMemory,
     offscreen: Offscreen,
     log: LogMemory,
     text: TextLayer,
@@ -95,7 +95,7 @@ impl DemoMemory {
         Self {
             model: Arena::new(),
             texels: [0; MAX_TEXELS],
-            storage: Storage::new(),
+            render: RenderMemory::new(),
             offscreen: Offscreen::new(),
             log: Log::MEMORY,
             text: TextLayer::new(),
@@ -184,14 +184,14 @@ impl<'a, B: Bus> Demo<'a, B> {
         let DemoMemory {
             model,
             texels,
-            storage,
+            render,
             offscreen,
             log,
             text,
         } = memory;
         let scenes = Scenes::new(model_file.map(|model_file| model_file.entry(model)));
         let state = State::new(scenes, scenes.default());
-        let presentation = Presentation::new(bus, state.entry(), texels, storage, offscreen)?;
+        let presentation = Presentation::new(bus, state.entry(), texels, render, offscreen)?;
         Ok(Self {
             state,
             log: Log::new(state, log),
@@ -295,16 +295,16 @@ impl<'a, B: Bus> Demo<'a, B> {
     /// Prepares the overlay for the frame of a tick. Returns whether the frame has an overlay.
     fn prepare_overlay(&mut self, tick: u32) -> bool {
         let (presentation, state) = (&mut self.presentation, &self.state);
-        let reduced_faces = presentation.reduced_faces();
+        let drawn = presentation.drawn;
         let counts = presentation.card.bus().counts();
         let figures = FrameStatistics {
             scene: state.entry().name,
             mapper: state.mapper,
             order: state.order,
             paused: state.is_paused(),
-            reduced_faces: state.reduced_quality.then_some(reduced_faces),
+            reduced_faces: state.reduced_quality.then_some(drawn.reduced),
             map_masks: counts.draw.map_mask + counts.erase.map_mask,
-            pixels: presentation.stats.pixels,
+            pixels: drawn.stats.pixels,
             largest_error: presentation.largest_error,
         };
         self.overlay.prepare(tick, &figures, || {

@@ -10,8 +10,8 @@ use core::fmt;
 
 use modex::{Destination, HEIGHT, Palette, WIDTH};
 use protocol::{Action, TICKS_PER_SECOND};
+use render::motion::TextureMotion;
 use scene::font;
-use scene::motion::Motion;
 use texmap::{Mapper, Order};
 
 use crate::KEYS;
@@ -137,7 +137,7 @@ impl<'a> Overlay<'a> {
         &mut self,
         tick: u32,
         figures: &FrameStatistics,
-        motion: impl FnOnce() -> Option<Motion>,
+        motion: impl FnOnce() -> Option<TextureMotion>,
     ) -> bool {
         let ticks = tick.wrapping_sub(self.interval.since);
         if ticks >= UPDATE_TICKS {
@@ -189,7 +189,7 @@ impl<'a> Overlay<'a> {
     /// Draws the prepared overlay.
     pub fn draw(&self, destination: &mut impl Destination) {
         if let Some(split) = self.split() {
-            split.draw_frame(destination);
+            split.draw_bars_and_legend(destination);
         }
         self.layer.draw(&self.inks, destination);
     }
@@ -227,7 +227,7 @@ impl<'a> Overlay<'a> {
         }
     }
 
-    fn write_info(&mut self, figures: &FrameStatistics, motion: Option<Motion>) {
+    fn write_info(&mut self, figures: &FrameStatistics, motion: Option<TextureMotion>) {
         let FrameStatistics {
             scene,
             mapper,
@@ -304,7 +304,7 @@ impl<'a> Overlay<'a> {
 
 /// Returns how far the visible texture moves from one frame to the next, and the range in which the eye sees
 /// that as motion (the sweet spot), in 2^-16 pixel. `None` if the frame rate is unknown.
-fn moved(motion: Option<Motion>, rate: Option<Rate>) -> Option<(u32, Option<(u32, u32)>)> {
+fn moved(motion: Option<TextureMotion>, rate: Option<Rate>) -> Option<(u32, Option<(u32, u32)>)> {
     let (motion, Rate { tenths, .. }) = motion.zip(rate)?;
     // Ticks a frame, 16.16.
     let ticks = ((10 * TICKS_PER_SECOND) << 16).checked_div(tenths)?;
@@ -371,7 +371,7 @@ mod tests {
     };
 
     /// A motion of 1.5 pixels a tick, a quarter of half a period.
-    const MOTION: Motion = Motion {
+    const MOTION: TextureMotion = TextureMotion {
         pixels: 3 << 15,
         part: 1 << 14,
     };
@@ -381,7 +381,11 @@ mod tests {
     }
 
     /// Returns the lines of `info` after a second of frames, `every` ticks apart.
-    fn info(every: u32, figures: &FrameStatistics, motion: Option<Motion>) -> Vec<(Ink, String)> {
+    fn info(
+        every: u32,
+        figures: &FrameStatistics,
+        motion: Option<TextureMotion>,
+    ) -> Vec<(Ink, String)> {
         let mut layer = Box::new(TextLayer::new());
         let mut overlay = overlay(&mut layer);
         overlay.act(0, Action::Info);
@@ -428,7 +432,7 @@ mod tests {
     #[test]
     fn info_says_whether_the_motion_is_in_the_sweet_spot() {
         let verdict = |every, pixels, part| {
-            let motion = Some(Motion { pixels, part });
+            let motion = Some(TextureMotion { pixels, part });
             info(every, &FIGURES, motion)[5..].to_vec()
         };
         assert_eq!(

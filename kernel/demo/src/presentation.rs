@@ -2,10 +2,11 @@
 
 use modex::{Bus, Counted, Destination, ModeX, Offscreen, Palette, SetError};
 use protocol::{FrameName, Motion};
+use render::motion::TextureMotion;
+use render::{Drawn, RenderMemory, RenderOptions, SceneRenderer};
+use scene::Pose;
 use scene::catalogue::{Entry, MAX_TEXELS};
-use scene::motion::Motion as TextureMotion;
-use scene::{Pose, Stage, Storage};
-use texmap::{Mapper, Order, Stats};
+use texmap::{Mapper, Order};
 
 use crate::frame::motion_between;
 use crate::overlay::Overlay;
@@ -27,13 +28,13 @@ pub(crate) struct Shown {
 pub(crate) struct Presentation<'a, B> {
     pub card: ModeX<Counted<B>>,
     offscreen: &'a mut Offscreen,
-    stage: Stage<'a>,
+    renderer: SceneRenderer<'a>,
     /// The memory that the scene's texture is painted into.
     texels: &'a mut [u8; MAX_TEXELS],
     /// The frame on the screen; `None` after a reset of the card.
     pub shown: Option<Shown>,
     /// Counts of what was drawn for the last frame.
-    pub stats: Stats,
+    pub drawn: Drawn,
     /// The largest error in the last frame if it was a split view, and 0 otherwise, in 2^-16 texel.
     pub largest_error: u32,
 }
@@ -47,38 +48,38 @@ impl<'a, B: Bus> Presentation<'a, B> {
         bus: B,
         entry: &Entry<'a>,
         texels: &'a mut [u8; MAX_TEXELS],
-        storage: &'a mut Storage,
+        render_memory: &'a mut RenderMemory,
         offscreen: &'a mut Offscreen,
     ) -> Result<Self, SetError> {
-        let stage = Stage::new(storage, entry.scene(&entry.paint(texels)));
+        let renderer = SceneRenderer::new(render_memory, entry.scene(&entry.paint(texels)));
         Ok(Self {
-            card: ModeX::set(Counted::new(bus), stage.palette())?,
+            card: ModeX::set(Counted::new(bus), renderer.palette())?,
             offscreen,
-            stage,
+            renderer,
             texels,
             shown: None,
-            stats: Stats::default(),
+            drawn: Drawn::default(),
             largest_error: 0,
         })
     }
 
     /// Returns the scene's palette.
     pub fn palette(&self) -> &'a Palette {
-        self.stage.palette()
+        self.renderer.palette()
     }
 
     /// Replaces the scene. It has another palette and background, so a [`reset`](Self::reset) must follow.
     pub fn set_scene(&mut self, entry: &Entry<'a>) {
-        self.stage.set(entry.scene(&entry.paint(self.texels)));
+        self.renderer.set(entry.scene(&entry.paint(self.texels)));
         self.offscreen.forget();
     }
 
     /// Sets the card's mode and palette again. No frame is on the card afterwards.
     pub fn reset(&mut self) {
         self.shown = None;
-        (self.stats, self.largest_error) = (Stats::default(), 0);
+        (self.drawn, self.largest_error) = (Drawn::default(), 0);
         self.card.bus().take_counts();
-        if let Err(error) = self.card.reset(self.stage.palette()) {
+        if let Err(error) = self.card.reset(self.renderer.palette()) {
             panic!("the card accepted Mode X before and refuses it now: {error}");
         }
     }
@@ -94,15 +95,17 @@ impl<'a, B: Bus> Presentation<'a, B> {
         overlay: Option<&Overlay<'_>>,
     ) {
         self.card.bus().take_counts();
-        self.stage.set_mapper(state.mapper);
-        self.stage.set_order(state.order);
-        self.stage.lower_for(next);
-        let background = self.stage.background();
+        let options = RenderOptions {
+            mapper: state.mapper,
+            order: state.order,
+            next,
+        };
+        let background = self.renderer.background();
         let split = overlay.and_then(Overlay::split);
-        (self.stats, self.largest_error) = match state.order {
+        (self.drawn, self.largest_error) = match state.order {
             Order::Polygons | Order::Planes => {
                 let mut page = self.card.begin(background);
-                let drawn = draw(&mut self.stage, split, pose, &mut page);
+                let drawn = draw(&mut self.renderer, split, pose, options, &mut page);
                 if let Some(overlay) = overlay {
                     overlay.draw(page.overlay());
                 }
@@ -110,7 +113,7 @@ impl<'a, B: Bus> Presentation<'a, B> {
             }
             Order::Buffer => {
                 self.offscreen.begin(background);
-                let drawn = draw(&mut self.stage, split, pose, self.offscreen);
+                let drawn = draw(&mut self.renderer, split, pose, options, self.offscreen);
                 if let Some(overlay) = overlay {
                     overlay.draw(self.offscreen);
                 }
@@ -120,7 +123,7 @@ impl<'a, B: Bus> Presentation<'a, B> {
         };
         self.card.flip();
         // A motion that reduces no face's quality makes no difference, so it is not part of the name.
-        let reduced = next.filter(|_| self.reduced_faces() > 0);
+        let reduced = next.filter(|_| self.drawn.reduced > 0);
         self.shown = Some(Shown {
             frame,
             motion: reduced.map(|next| motion_between(pose, &next)),
@@ -128,27 +131,23 @@ impl<'a, B: Bus> Presentation<'a, B> {
         });
     }
 
-    /// Returns how many faces of the last frame were drawn in reduced quality.
-    pub fn reduced_faces(&self) -> u32 {
-        self.stage.lowered()
-    }
-
     /// Returns how the visible texture moves from a pose to the next.
     pub fn texture_motion(&mut self, pose: &Pose, next: &Pose) -> Option<TextureMotion> {
-        self.stage.motion(pose, next)
+        self.renderer.at(pose).motion(next)
     }
 }
 
 /// Draws a frame, or its split view. Returns counts of what was drawn, and the largest error in 2^-16 texel:
 /// 0 if the frame is not split.
 fn draw(
-    stage: &mut Stage<'_>,
+    renderer: &mut SceneRenderer<'_>,
     split: Option<&SplitView>,
     pose: &Pose,
+    options: RenderOptions,
     destination: &mut impl Destination,
-) -> (Stats, u32) {
+) -> (Drawn, u32) {
     match split {
-        Some(split) => split.draw(stage, pose, destination),
-        None => (stage.draw(pose, destination), 0),
+        Some(split) => split.draw(renderer, pose, options, destination),
+        None => (renderer.draw(pose, options, destination), 0),
     }
 }

@@ -10,8 +10,9 @@
 use core::ops::Range;
 
 use modex::{Destination, HEIGHT, Palette, Rgb6, WIDTH, Window};
-use scene::{Pose, Stage};
-use texmap::{Mapper, Stats};
+use render::{Drawn, RenderOptions, SceneRenderer};
+use scene::Pose;
+use texmap::Mapper;
 
 use crate::palette::nearest;
 
@@ -72,25 +73,28 @@ impl SplitView {
     /// 2^-16 texel.
     pub fn draw(
         &self,
-        stage: &mut Stage<'_>,
+        renderer: &mut SceneRenderer<'_>,
         pose: &Pose,
+        options: RenderOptions,
         destination: &mut impl Destination,
-    ) -> (Stats, u32) {
+    ) -> (Drawn, u32) {
         let [left, middle, right] = PANELS.map(|x| x as u16);
-        let (mapper, next) = (stage.mapper(), stage.lower_for(None));
-        stage.set_mapper(Mapper::Exact);
-        stage.draw(pose, &mut Window::new(destination, COLUMNS, middle));
-        stage.set_mapper(mapper);
-        stage.lower_for(next);
+        let exact = RenderOptions {
+            mapper: Mapper::Exact,
+            next: None,
+            ..options
+        };
+        let mut posed = renderer.at(pose);
+        posed.draw(exact, &mut Window::new(destination, COLUMNS, middle));
         let colour = |error| self.heat[step(error)];
         let mut panel = Window::new(destination, COLUMNS, right);
-        let largest_error = stage.draw_errors(pose, COLUMNS, colour, &mut panel);
-        let stats = stage.draw(pose, &mut Window::new(destination, COLUMNS, left));
-        (stats, largest_error)
+        let largest_error = posed.draw_errors(options, COLUMNS, colour, &mut panel);
+        let drawn = posed.draw(options, &mut Window::new(destination, COLUMNS, left));
+        (drawn, largest_error)
     }
 
     /// Draws the bars between the panels, and the heat map's legend.
-    pub fn draw_frame(&self, destination: &mut impl Destination) {
+    pub fn draw_bars_and_legend(&self, destination: &mut impl Destination) {
         let (left, top) = (LEGEND_X, LEGEND_Y);
         for plane in 0..4 {
             destination.select(plane as u16);

@@ -500,7 +500,7 @@ pub(crate) mod tests {
         let scenes = Scenes::new(Some(model));
         let mut state = State::new(scenes, scenes.default());
         assert_eq!(state.entry().name, Entry::LOADED);
-        for entry in &CATALOGUE {
+        for entry in CATALOGUE {
             act(&mut state, 0, Action::NextScene);
             assert_eq!(state.entry().name, entry.name);
         }

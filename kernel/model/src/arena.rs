@@ -1,6 +1,6 @@
 //! The memory that a model file's mesh is unpacked into.
 
-use scene::{Corner, Face, MAX_VERTICES, Vec3};
+use scene::{Corner, MAX_VERTICES, MeshFace, Vec3};
 
 use crate::{MAX_ALL_CORNERS, MAX_FACES};
 
@@ -9,7 +9,7 @@ use crate::{MAX_ALL_CORNERS, MAX_FACES};
 pub struct Arena {
     pub(crate) vertices: [Vec3; MAX_VERTICES],
     pub(crate) corners: [Corner; MAX_ALL_CORNERS],
-    pub(crate) faces: [Face; MAX_FACES],
+    pub(crate) faces: [MeshFace; MAX_FACES],
 }
 
 impl Arena {
@@ -22,7 +22,7 @@ impl Arena {
                 u: 0,
                 v: 0,
             }; MAX_ALL_CORNERS],
-            faces: [Face {
+            faces: [MeshFace {
                 first: 0,
                 corners: 0,
                 texture: 0,

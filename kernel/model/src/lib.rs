@@ -39,14 +39,14 @@
 //! ```
 //! use model::{ModelFile, Parts};
 //! use scene::catalogue::Colours;
-//! use scene::{Corner, Face, Mesh};
+//! use scene::{Corner, Mesh, MeshFace};
 //! use texmap::Texture;
 //!
 //! // A triangle with a texture of one texel.
-//! let face = Face {
+//! let face = MeshFace {
 //!     corners: 3,
 //!     normal: [0, 0, -(1 << 14)],
-//!     ..Face::default()
+//!     ..MeshFace::default()
 //! };
 //! let parts = Parts {
 //!     mesh: Mesh {
@@ -73,7 +73,8 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use modex::{HEIGHT, Palette};
 use scene::catalogue::{Colours, Entry};
 use scene::{
-    Corner, Face, LIGHT_LEVELS, LightTable, MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh,
+    Corner, LIGHT_LEVELS, LightTable, MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh,
+    MeshFace,
 };
 use texmap::Texture;
 
@@ -398,9 +399,9 @@ fn corner(bytes: &[u8; CORNER]) -> Corner {
 
 /// Returns a face whose first corner is `first`, which is at most [`MAX_ALL_CORNERS`] in an accepted model
 /// file.
-fn face_at(bytes: &[u8; FACE], first: usize) -> Face {
+fn face_at(bytes: &[u8; FACE], first: usize) -> MeshFace {
     let (words, _) = bytes.as_chunks();
-    Face {
+    MeshFace {
         first: first as u16,
         corners: u16::from_le_bytes(words[0]),
         texture: 0,
@@ -413,7 +414,8 @@ mod tests {
     extern crate std;
     use super::*;
     use modex::PlanarBuffer;
-    use scene::{Pose, Stage, Storage};
+    use render::{RenderMemory, RenderOptions, SceneRenderer};
+    use scene::Pose;
     use std::boxed::Box;
     use std::string::ToString;
     use std::vec::Vec;
@@ -597,10 +599,10 @@ mod tests {
             })
             .collect();
         let faces = std::vec![
-            Face {
+            MeshFace {
                 corners: 3,
                 normal: [9460, 9459, -9459],
-                ..Face::default()
+                ..MeshFace::default()
             };
             MAX_FACES
         ];
@@ -621,15 +623,17 @@ mod tests {
         let model_file = ModelFile::parse(&bytes).unwrap();
         let mut arena = in_place::boxed!(Arena);
         let entry = model_file.entry(&mut arena);
-        let mut storage = in_place::boxed!(Storage);
+        let mut storage = in_place::boxed!(RenderMemory);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
         let textures = entry.paint(&mut painted);
-        let mut stage = Stage::new(&mut storage, entry.scene(&textures));
+        let mut renderer = SceneRenderer::new(&mut storage, entry.scene(&textures));
         let pose = Pose {
             distance: Pose::MAX_DISTANCE,
             ..entry.pose(77)
         };
-        let stats = stage.draw(&pose, &mut PlanarBuffer::new());
+        let stats = renderer
+            .draw(&pose, RenderOptions::default(), &mut PlanarBuffer::new())
+            .stats;
         assert!(stats.polygons > 1000, "{stats:?}");
     }
 }

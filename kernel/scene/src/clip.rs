@@ -25,7 +25,7 @@
 //!
 //! # The arithmetic
 //!
-//! A corner has [`FINE`] more fraction bits than a vertex of the mesh: below 2^52 in size. Its height above a
+//! A corner has `FINE` more fraction bits than a vertex of the mesh: below 2^52 in size. Its height above a
 //! plane is exact and below 2^68; a crossing's product stays below 2^122. A crossing is rounded to 2^-44 unit
 //! (half up). On the screen that error is largest where z is least and x / z most: (258 x 256 / NEAR) (1 +
 //! 128) 2^-29, less than 1/8000 of 1/256 pixel. The guard band ends on a whole number of 1/256 pixels, so
@@ -45,7 +45,7 @@ use crate::camera::{FOCAL_LENGTH, NEAR, project, project_fine};
 use crate::{Corner, Vec3};
 
 /// Number of clip planes.
-pub(crate) const PLANES: usize = 5;
+pub const PLANES: usize = 5;
 
 /// Fraction bits of a corner beyond the 16 of a vertex.
 const FINE: u32 = 28;
@@ -54,20 +54,20 @@ const FINE: u32 = 28;
 const GUARD: i64 = (MAX_COORDINATE / SUBPIXELS) as i64;
 
 /// A half-space: the points whose product with `form` is at least `least`.
-struct Plane {
+struct ClipPlane {
     form: [i64; 3],
     least: i64,
 }
 
 /// The clip planes, in the order in which they cut.
-static CLIPS: [Plane; PLANES] = {
-    const fn guard(form: [i64; 3]) -> Plane {
-        Plane { form, least: 0 }
+static CLIPS: [ClipPlane; PLANES] = {
+    const fn guard(form: [i64; 3]) -> ClipPlane {
+        ClipPlane { form, least: 0 }
     }
     let focal = FOCAL_LENGTH as i64;
     let (x, y) = (WIDTH as i64 / 2, HEIGHT as i64 / 2);
     [
-        Plane {
+        ClipPlane {
             form: [0, 0, 1],
             least: NEAR as i64,
         },
@@ -81,7 +81,7 @@ static CLIPS: [Plane; PLANES] = {
 
 /// A vertex of the mesh in view space, shared by all faces that meet in it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Point {
+pub struct ViewPoint {
     /// In view space, 16.16.
     view: Vec3,
     /// On the screen in 1/256 pixel, if the vertex is inside all planes.
@@ -90,7 +90,7 @@ pub(crate) struct Point {
     outside: u8,
 }
 
-impl Point {
+impl ViewPoint {
     /// The initial value of an arena's points.
     pub const ORIGIN: Self = Self {
         view: [0; 3],
@@ -116,7 +116,7 @@ impl Point {
     }
 }
 
-impl Point {
+impl ViewPoint {
     /// In view space, 16.16.
     pub fn view(&self) -> Vec3 {
         self.view
@@ -125,7 +125,7 @@ impl Point {
 
 /// A corner during clipping.
 #[derive(Clone, Copy, Default)]
-struct Placed {
+struct ClipCorner {
     /// In view space, 16 + FINE fraction bits.
     at: [i64; 3],
     u: i32,
@@ -134,27 +134,27 @@ struct Placed {
 
 /// The part of a face that the planes have left.
 struct Outline {
-    corners: [Placed; MAX_SIDES],
+    corners: [ClipCorner; MAX_SIDES],
     len: usize,
 }
 
 impl Outline {
     fn new() -> Self {
         Self {
-            corners: [Placed::default(); MAX_SIDES],
+            corners: [ClipCorner::default(); MAX_SIDES],
             len: 0,
         }
     }
 
     /// Adds a corner, or returns `None` if the outline is full.
-    fn push(&mut self, corner: Placed) -> Option<()> {
+    fn push(&mut self, corner: ClipCorner) -> Option<()> {
         *self.corners.get_mut(self.len)? = corner;
         self.len += 1;
         Some(())
     }
 
     /// Returns the part inside `plane`, or `None` if it has more than [`MAX_SIDES`] corners.
-    fn cut(&self, plane: &Plane) -> Option<Self> {
+    fn cut(&self, plane: &ClipPlane) -> Option<Self> {
         let mut kept = Self::new();
         let corners = &self.corners[..self.len];
         for (i, a) in corners.iter().enumerate() {
@@ -174,9 +174,9 @@ impl Outline {
     }
 }
 
-impl Plane {
+impl ClipPlane {
     /// The distance of `corner` inside the plane, in the units of the plane's form.
-    fn height(&self, corner: &Placed) -> i128 {
+    fn height(&self, corner: &ClipCorner) -> i128 {
         let product: i128 = (0..3)
             .map(|k| i128::from(self.form[k]) * i128::from(corner.at[k]))
             .sum();
@@ -187,13 +187,13 @@ impl Plane {
 /// The point where the edge from the end inside to the end outside meets the plane. `above` (more than 0) and
 /// `below` (less than 0) are the heights of the two ends. The point and its texture coordinates lie between
 /// the two ends, so nothing needs clamping.
-fn crossing(inside: &Placed, outside: &Placed, above: i128, below: i128) -> Placed {
+fn crossing(inside: &ClipCorner, outside: &ClipCorner, above: i128, below: i128) -> ClipCorner {
     let whole = above - below;
     let between = |from: i64, to: i64| {
         let part = (i128::from(to) - i128::from(from)) * above;
         from + (2 * part + whole).div_euclid(2 * whole) as i64
     };
-    Placed {
+    ClipCorner {
         at: [0, 1, 2].map(|k| between(inside.at[k], outside.at[k])),
         u: between(inside.u.into(), outside.u.into()) as i32,
         v: between(inside.v.into(), outside.v.into()) as i32,
@@ -202,9 +202,9 @@ fn crossing(inside: &Placed, outside: &Placed, above: i128, below: i128) -> Plac
 
 /// Projects a face to the screen, clipped if necessary, and returns how many vertices of `polygon` it uses:
 /// fewer than 3 if nothing is visible. Returns `None` if the face needs more than [`MAX_SIDES`] vertices.
-pub(crate) fn place(
+pub fn place(
     corners: &[Corner],
-    points: &[Point],
+    points: &[ViewPoint],
     polygon: &mut [Vertex; MAX_SIDES],
 ) -> Option<usize> {
     let point = |corner: &Corner| &points[usize::from(corner.vertex)];
@@ -233,11 +233,15 @@ pub(crate) fn place(
 
 /// Cold path: clipping is rare, so it stays out of the common path.
 #[cold]
-fn clip(corners: &[Corner], points: &[Point], polygon: &mut [Vertex; MAX_SIDES]) -> Option<usize> {
+fn clip(
+    corners: &[Corner],
+    points: &[ViewPoint],
+    polygon: &mut [Vertex; MAX_SIDES],
+) -> Option<usize> {
     let mut outline = Outline::new();
     for corner in corners {
         let view = points[usize::from(corner.vertex)].view;
-        outline.push(Placed {
+        outline.push(ClipCorner {
             at: view.map(|k| i64::from(k) << FINE),
             u: corner.u,
             v: corner.v,
@@ -274,7 +278,7 @@ mod tests {
     /// Places a face with these points as corners. The texture coordinates are spread over the whole texture,
     /// and equal points get equal coordinates.
     fn placed(views: &[Vec3]) -> Vec<Vertex> {
-        let points: Vec<_> = views.iter().map(|&view| Point::new(view)).collect();
+        let points: Vec<_> = views.iter().map(|&view| ViewPoint::new(view)).collect();
         let corners: Vec<_> = (0..)
             .zip(views)
             .map(|(vertex, view)| Corner {
@@ -353,10 +357,10 @@ mod tests {
             (4, [32_607, 32_647, 258], [0, 1, 0], (most, most)),
         ] {
             let step = |sign: i32| [0, 1, 2].map(|k| at[k] + sign * beyond[k]);
-            assert_eq!(Point::new(at).outside, 0, "{at:?}");
-            assert_eq!(Point::new(at).screen, on_screen, "{at:?}");
-            assert_eq!(Point::new(step(-1)).outside, 0, "{at:?}");
-            assert_eq!(Point::new(step(1)).outside, 1 << plane, "{at:?}");
+            assert_eq!(ViewPoint::new(at).outside, 0, "{at:?}");
+            assert_eq!(ViewPoint::new(at).screen, on_screen, "{at:?}");
+            assert_eq!(ViewPoint::new(step(-1)).outside, 0, "{at:?}");
+            assert_eq!(ViewPoint::new(step(1)).outside, 1 << plane, "{at:?}");
             // A triangle keeps a corner on or inside the plane; a corner outside is replaced by two. Each
             // result is legal.
             let others = [[900, 900, 2000], [-1200, 300, 2000]];
@@ -380,7 +384,7 @@ mod tests {
 
     #[test]
     fn a_crossing_is_the_exact_point_rounded_with_ties_up() {
-        let end = |at, u, v| Placed { at, u, v };
+        let end = |at, u, v| ClipCorner { at, u, v };
         let (inside, outside) = (end([0, 3, 8], 0, SIDE), end([3, 0, 8], SIDE, SIDE - 3));
         // Fractions of the way: a half, a third, two thirds.
         for (above, below, at, u, v) in [
@@ -418,7 +422,7 @@ mod tests {
                     );
                 }
             }
-            let [a, b] = [a, b].map(|view| Point::new(view).outside);
+            let [a, b] = [a, b].map(|view| ViewPoint::new(view).outside);
             clipped += u32::from(!edge.is_empty() && a | b != 0);
             twice += u32::from(!edge.is_empty() && a != 0 && b != 0);
         }
@@ -480,7 +484,7 @@ mod tests {
         let (mut seen, mut hidden, mut by_near) = (0, 0, 0);
         for _ in 0..seeded::cases(700) {
             let views = [0; 3].map(|_| view(&mut random));
-            if views.iter().all(|&view| Point::new(view).outside == 0) {
+            if views.iter().all(|&view| ViewPoint::new(view).outside == 0) {
                 continue;
             }
             let [a, b, c] = views.map(|view| view.map(f64::from));

@@ -14,8 +14,8 @@
 //!
 //! # Why a table
 //! A facet has one light level, so a whole texture is run through one row of [`LIGHT_TABLE`] when the scene
-//! is set, and drawing costs no more (see [`Stage`](crate::Stage)). The same row first dims (diffuse light)
-//! and then adds (the highlight), which no product could do.
+//! is set, and drawing costs no more. The same row first dims (diffuse light) and then adds (the highlight),
+//! which no product could do.
 //!
 //! # The background
 //! The background is a function of the scan line alone: dusk over a sea. Between two neighbouring colours the

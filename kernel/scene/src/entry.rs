@@ -9,7 +9,30 @@ use modex::{HEIGHT, Palette};
 use texmap::Texture;
 
 use crate::colour::{LIGHT_TABLE, PALETTE};
-use crate::{LightTable, Mesh, Pose, Scene};
+use crate::{LightTable, Mesh, Pose};
+
+/// A mesh with its textures, colours and background.
+///
+/// `'t` is the textures' lifetime. The renderer makes its own lit copies, so the textures need not outlive
+/// its set-up.
+#[derive(Clone, Copy, Debug)]
+pub struct Scene<'a, 't> {
+    /// Name, for people.
+    pub name: &'static str,
+    /// The solid, about the origin.
+    pub mesh: Mesh<'a>,
+    /// Textures in full light.
+    pub textures: &'t [Texture<'t>],
+    /// The DAC's colours.
+    pub palette: &'a Palette,
+    /// The colour that each colour becomes at each light level.
+    pub light: &'t LightTable,
+    /// The colour of each scan line where no solid covers it.
+    pub background: &'a [u8; HEIGHT],
+    /// Whether the textures need smaller copies for distant faces. If so, the sides of the textures, or of
+    /// their tiles, are powers of two.
+    pub mipmaps: bool,
+}
 
 /// Texels of the largest painted texture: the memory that [`Entry::paint`] borrows.
 pub const MAX_TEXELS: usize = 256 * 256;

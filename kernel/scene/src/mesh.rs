@@ -4,6 +4,10 @@ use texmap::MAX_SIDES;
 
 use crate::clip::PLANES;
 
+/// Most vertices of a mesh.
+pub const MAX_VERTICES: usize = 4096;
+/// Most faces of a mesh that is not convex. Such a mesh's faces keep their numbers until the frame is drawn.
+pub const MAX_FACES: usize = 8192;
 /// Most corners of a face. Clipping may add a corner at each of five planes, and the result must still be a
 /// polygon of at most [`MAX_SIDES`] sides.
 pub const MAX_CORNERS: usize = MAX_SIDES - PLANES;
@@ -29,7 +33,7 @@ pub struct Corner {
 
 /// A flat convex face.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Face {
+pub struct MeshFace {
     /// Index of the face's first corner. The corners follow each other clockwise when the face looks at the
     /// viewer.
     pub first: u16,
@@ -49,8 +53,8 @@ pub struct Mesh<'a> {
     /// Corners of all faces.
     pub corners: &'a [Corner],
     /// Faces.
-    pub faces: &'a [Face],
+    pub faces: &'a [MeshFace],
     /// Whether no front face can hide a part of another, as in a convex solid or a single face. A mesh that
-    /// is not convex has at most [`MAX_FACES`](crate::MAX_FACES) faces.
+    /// is not convex has at most [`MAX_FACES`] faces.
     pub convex: bool,
 }

@@ -10,8 +10,9 @@ use std::ops::Range;
 
 use fastrand::Rng;
 use modex::{HEIGHT, WIDTH};
-use scene::{FOCAL_LENGTH, Pose, Stage, Storage, Vec3};
-use texmap::{Face, Mapper, Order, Point};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
+use scene::{FOCAL_LENGTH, Pose, Vec3};
+use texmap::{Face, Point};
 
 use crate::coverage::{Area, Pixels};
 use crate::solid::{Count, Solid};
@@ -77,23 +78,21 @@ pub struct Compared {
     pub borders: u64,
 }
 
-/// Compares the visible face at each pixel, and how often each pixel is written when `mapper` maps it.
+/// Compares the visible face at each pixel, and how often each pixel is written when the frame is drawn with `options`.
 ///
 /// # Errors
 /// A description of the first difference.
 pub fn check(
-    storage: &mut Storage,
+    storage: &mut RenderMemory,
     solid: &Solid,
     pose: &Pose,
-    mapper: Mapper,
-    order: Order,
+    options: RenderOptions,
 ) -> Result<Compared, String> {
     let mut count = Count::default();
     solid.on_stage(storage, |stage| {
-        stage.set_mapper(mapper);
-        stage.set_order(order);
         let nearest = sorted(stage, pose);
-        let visible = stage.find_visible(pose);
+        let posed = stage.at(pose);
+        let visible = posed.visible().expect("the solid is not convex");
         let mut compared = Compared::default();
         let mut found = Vec::new();
         for i in 0..WIDTH * HEIGHT {
@@ -119,7 +118,7 @@ pub fn check(
         let below =
             |i: usize| found[i].is_some() && found.get(i + WIDTH).is_some_and(|b| *b != found[i]);
         compared.borders = (0..found.len()).filter(|&i| below(i)).count() as u64;
-        let stats = count.redraw(stage, pose);
+        let stats = count.redraw(stage, pose, options);
         if u64::from(stats.pixels) != compared.pixels {
             return Err(format!(
                 "{} pixels were written of {}",
@@ -137,16 +136,16 @@ pub fn check(
 }
 
 /// The numbers of the front faces that cover each pixel, the nearest first.
-pub fn nearest(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<u16>> {
+pub fn nearest(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<u16>> {
     let numbers = |faces: Vec<(u16, Nearness)>| faces.into_iter().map(|face| face.0).collect();
     sorted(stage, pose).into_iter().map(numbers).collect()
 }
 
 /// The faces that cover each pixel, the nearest first.
-fn sorted(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
+fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
     let mut at = vec![Vec::new(); WIDTH * HEIGHT];
     let mut covered = Pixels::default();
-    stage.polygons(pose, |number, face| {
+    stage.at(pose).faces(|number, face| {
         let Some(Face {
             polygon, anchors, ..
         }) = face

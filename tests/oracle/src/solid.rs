@@ -8,9 +8,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use fastrand::Rng;
 use in_place::InPlace;
 use modex::{Destination, HEIGHT, Lane, Palette, PlanarBuffer, STRIDE, WIDTH};
+use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::{
-    Corner, FOCAL_LENGTH, Face, LIGHT_LEVELS, LightTable, Mesh, NEAR, Pose, Scene, Stage, Storage,
-    Vec3,
+    Corner, FOCAL_LENGTH, LIGHT_LEVELS, LightTable, Mesh, MeshFace, NEAR, Pose, Scene, Vec3,
 };
 use texmap::{MAX_COORDINATE, Point, Stats, Texture};
 
@@ -29,7 +29,7 @@ pub struct Solid {
     /// Points, 16.16.
     pub vertices: Vec<Vec3>,
     corners: Vec<Corner>,
-    faces: Vec<Face>,
+    faces: Vec<MeshFace>,
     convex: bool,
 }
 
@@ -43,7 +43,7 @@ impl Solid {
             convex: true,
         };
         for face in faces {
-            solid.faces.push(Face {
+            solid.faces.push(MeshFace {
                 first: solid.corners.len() as u16,
                 corners: face.len() as u16,
                 texture: 0,
@@ -159,7 +159,7 @@ impl Solid {
                 vertex: vertices + corner.vertex,
                 ..*corner
             }));
-        self.faces.extend(other.faces.iter().map(|face| Face {
+        self.faces.extend(other.faces.iter().map(|face| MeshFace {
             first: corners + face.first,
             ..*face
         }));
@@ -167,7 +167,11 @@ impl Solid {
     }
 
     /// Calls `act` with a stage that has the solid.
-    pub fn on_stage<T>(&self, storage: &mut Storage, act: impl FnOnce(&mut Stage<'_>) -> T) -> T {
+    pub fn on_stage<T>(
+        &self,
+        storage: &mut RenderMemory,
+        act: impl FnOnce(&mut SceneRenderer<'_>) -> T,
+    ) -> T {
         static LIGHT: LightTable = [[1; 256]; LIGHT_LEVELS];
         static PALETTE: Palette = [[0; 3]; 256];
         static BACKGROUND: [u8; HEIGHT] = [0; HEIGHT];
@@ -187,7 +191,7 @@ impl Solid {
             background: &BACKGROUND,
             mipmaps: false,
         };
-        act(&mut Stage::new(storage, scene))
+        act(&mut SceneRenderer::new(storage, scene))
     }
 
     /// The corners of each face in view space.
@@ -240,14 +244,21 @@ impl Count {
     }
 
     /// Clears the counts and draws a solid.
-    pub fn draw(&mut self, storage: &mut Storage, solid: &Solid, pose: &Pose) -> Stats {
-        solid.on_stage(storage, |stage| self.redraw(stage, pose))
+    pub fn draw(&mut self, storage: &mut RenderMemory, solid: &Solid, pose: &Pose) -> Stats {
+        solid.on_stage(storage, |stage| {
+            self.redraw(stage, pose, RenderOptions::default())
+        })
     }
 
     /// Clears the counts and draws a stage's solid.
-    pub fn redraw(&mut self, stage: &mut Stage<'_>, pose: &Pose) -> Stats {
+    pub fn redraw(
+        &mut self,
+        stage: &mut SceneRenderer<'_>,
+        pose: &Pose,
+        options: RenderOptions,
+    ) -> Stats {
         self.times.fill(0);
-        stage.draw(pose, self)
+        stage.draw(pose, options, self).stats
     }
 }
 
@@ -562,7 +573,7 @@ const SNAPPED: f64 = 1.0 / 128.0;
 /// Checks cases, and owns the memory for that.
 #[derive(Debug)]
 pub struct Checker {
-    storage: InPlace<Storage>,
+    storage: InPlace<RenderMemory>,
     front: Count,
     back: Count,
     covered: Pixels,
@@ -571,7 +582,7 @@ pub struct Checker {
 impl Default for Checker {
     fn default() -> Self {
         Self {
-            storage: in_place::boxed!(Storage),
+            storage: in_place::boxed!(RenderMemory),
             front: Count::default(),
             back: Count::default(),
             covered: Pixels::default(),
@@ -650,7 +661,7 @@ impl Checker {
         let mut drawn = Vec::new();
         let mut dropped = 0;
         solid.on_stage(&mut self.storage, |stage| {
-            stage.polygons(pose, |_, face| match face {
+            stage.at(pose).faces(|_, face| match face {
                 Some(face) => drawn.push((
                     face.anchors.map(|anchor| anchor.position),
                     face.polygon
@@ -740,10 +751,10 @@ fn none_dropped(stats: Stats) -> Result<(), Wrong> {
 const ROUNDED: f64 = 2.0 * 1.733;
 
 /// Whether the drawn pixel is covered by a face that rounding may have turned over.
-fn is_in_fold(storage: &mut Storage, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
+fn is_in_fold(storage: &mut RenderMemory, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
     let mut covering = Vec::new();
     solid.on_stage(storage, |stage| {
-        stage.polygons(pose, |_, drawn| {
+        stage.at(pose).faces(|_, drawn| {
             let drawn = drawn.into_iter();
             covering.extend(drawn.filter_map(|drawn| {
                 let polygon: Vec<Point> = drawn.polygon.iter().map(|&v| v.into()).collect();

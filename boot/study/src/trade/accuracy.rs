@@ -13,7 +13,7 @@ use super::stats::{Errors, psnr};
 use super::subject::{Owned, Subject};
 
 /// The jobs of a whole frame.
-pub type Jobs = JobList<{ scene::MAX_JOBS }>;
+pub type Jobs = JobList<{ render::MAX_JOBS }>;
 
 /// A mapper's accuracy on a scene.
 #[derive(Clone, Debug, Default)]

@@ -1,7 +1,8 @@
 //! The subjects that mappers are measured on: scenes at several poses, and random polygons.
 
+use render::{RenderMemory, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
-use scene::{Corner, FOCAL_LENGTH, Face as MeshFace, Mesh, Pose, Scene, Stage, Storage, Vec3};
+use scene::{Corner, FOCAL_LENGTH, Mesh, MeshFace, Pose, Scene, Vec3};
 use texmap::plane::Anchor;
 use texmap::{Face, Texture, Vertex};
 
@@ -71,14 +72,21 @@ pub struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    fn new(name: &'static str, about: String, stage: &'a mut Stage<'_>, poses: &[Pose]) -> Self {
+    fn new(
+        name: &'static str,
+        about: String,
+        stage: &'a mut SceneRenderer<'_>,
+        poses: &[Pose],
+    ) -> Self {
         let mut frames = Vec::new();
         for pose in poses {
             let mut faces = Vec::new();
-            stage.polygons(pose, |_, face| faces.extend(face.as_ref().map(Owned::new)));
+            stage
+                .at(pose)
+                .faces(|_, face| faces.extend(face.as_ref().map(Owned::new)));
             frames.push(faces);
         }
-        let stage: &'a Stage<'_> = stage;
+        let stage: &'a SceneRenderer<'_> = stage;
         let numbers = frames.iter().flatten().map(|face| face.texture);
         let most = numbers.max().unwrap_or(0);
         Self {
@@ -129,9 +137,9 @@ pub fn with_entry<T>(entry: &Entry<'_>, look: impl FnOnce(&Subject<'_>) -> T) ->
 /// Makes a subject of a scene at some poses, and passes it to `look`.
 pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     let textures = entry.paint(&mut texels);
-    let mut stage = Stage::new(&mut storage, entry.scene(&textures));
+    let mut stage = SceneRenderer::new(&mut storage, entry.scene(&textures));
     let about = entry.about.to_string();
     look(&Subject::new(entry.name, about, &mut stage, poses))
 }
@@ -140,7 +148,7 @@ pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subje
 /// `look`.
 fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     let entry = Entry::parse("tilted").expect("it is in the catalogue");
     let textures = entry.paint(&mut texels);
     let (vertices, corners, faces) = random_mesh(seed);
@@ -162,7 +170,7 @@ fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
         distance: 0,
     };
     let about = format!("{POLYGONS} parallelograms at random, seed {seed}");
-    let mut stage = Stage::new(&mut storage, scene);
+    let mut stage = SceneRenderer::new(&mut storage, scene);
     look(&Subject::new(RANDOM, about, &mut stage, &[pose]))
 }
 

@@ -6,7 +6,7 @@ use texmap::Texture;
 use crate::colour::{BACKGROUND, LIGHT_TABLE, PALETTE};
 use crate::entry::{Colours, Cover, Entry, MAX_TEXELS};
 use crate::trig::{cos, mul, sin};
-use crate::{Corner, Face, Mesh, Pose, Scene, Vec3, paint};
+use crate::{Corner, Mesh, MeshFace, Pose, Scene, Vec3, paint};
 
 /// Facets around: 15 degrees each, so that gold meridians lie along edges and do not kink.
 const SEGMENTS: usize = 24;
@@ -26,7 +26,7 @@ pub const TEXELS: usize = TEXTURE_WIDTH as usize * TEXTURE_HEIGHT as usize;
 struct Solid {
     vertices: [Vec3; VERTICES],
     corners: [Corner; CORNERS],
-    faces: [Face; FACES],
+    faces: [MeshFace; FACES],
 }
 
 /// Built by the compiler: the boot image contains it, and nothing is computed at start-up.
@@ -150,7 +150,7 @@ const fn build() -> Solid {
     }
 
     let mut corners = [corner(0, 0, 0); CORNERS];
-    let empty = Face {
+    let empty = MeshFace {
         first: 0,
         corners: 3,
         texture: 0,
@@ -195,7 +195,7 @@ const fn build() -> Solid {
                     corners[3 * face] = triangle[0];
                     corners[3 * face + 1] = triangle[1];
                     corners[3 * face + 2] = triangle[2];
-                    faces[face] = Face {
+                    faces[face] = MeshFace {
                         first: 3 * face as u16,
                         corners: 3,
                         texture: 0,

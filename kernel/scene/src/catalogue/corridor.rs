@@ -12,7 +12,7 @@ use crate::colour::LEVEL_BACKGROUND;
 use crate::colour::Ramp::{Azure, Gold, Indigo, Pearl, Rose, Teal, Violet};
 use crate::entry::{Colours, Cover, Entry, MAX_TEXELS, Textures};
 use crate::noise::{fractal, hash};
-use crate::{Corner, Face, Mesh, Pose, Vec3};
+use crate::{Corner, Mesh, MeshFace, Pose, Vec3};
 
 /// Texels along each side of a tile.
 const TILE: u16 = 64;
@@ -34,7 +34,7 @@ const TOP: i32 = FLOOR - (2 << 16);
 struct Solid {
     vertices: [Vec3; 4 * STATIONS.len()],
     corners: [Corner; 4 * FACES],
-    faces: [Face; FACES],
+    faces: [MeshFace; FACES],
 }
 
 static SOLID: Solid = build();
@@ -100,7 +100,7 @@ const fn build() -> Solid {
     let mut solid = Solid {
         vertices: [[0; 3]; 4 * STATIONS.len()],
         corners: [empty; 4 * FACES],
-        faces: [Face {
+        faces: [MeshFace {
             first: 0,
             corners: 4,
             texture: 0,
@@ -166,7 +166,7 @@ const fn build() -> Solid {
                 solid.corners[4 * face + k] = Corner { vertex, u, v };
                 k += 1;
             }
-            solid.faces[face] = Face {
+            solid.faces[face] = MeshFace {
                 first: 4 * face as u16,
                 corners: 4,
                 texture,

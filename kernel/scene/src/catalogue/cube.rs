@@ -6,7 +6,7 @@ use super::surfaces;
 use crate::colour::BACKGROUND;
 use crate::entry::{Colours, Cover, Entry};
 use crate::trig::sin;
-use crate::{Corner, Face, Mesh, Pose, Vec3};
+use crate::{Corner, Mesh, MeshFace, Pose, Vec3};
 
 /// The crate.
 pub const CUBE: Entry<'static> = Entry {
@@ -43,7 +43,7 @@ static CUBE_VERTICES: [Vec3; 24] = {
     ]
 };
 static CUBE_CORNERS: [Corner; 24] = corners();
-static CUBE_FACES: [Face; 6] = [
+static CUBE_FACES: [MeshFace; 6] = [
     face(0, [0, 0, -ONE]),
     face(4, [ONE, 0, 0]),
     face(8, [0, 0, ONE]),

@@ -14,7 +14,7 @@ use crate::colour::Ramp::{Azure, Gold, Indigo, Pearl, Rose, Teal, Violet};
 use crate::entry::{Colours, Cover, Entry, MAX_TEXELS};
 use crate::noise::fractal;
 use crate::trig::{cos, mul, sin};
-use crate::{Corner, Face, Mesh, Pose, Vec3};
+use crate::{Corner, Mesh, MeshFace, Pose, Vec3};
 
 /// Rings along the curve, and corners of each.
 const RINGS: usize = 60;
@@ -33,7 +33,7 @@ const TUBE: i64 = 17;
 struct Solid {
     vertices: [Vec3; VERTICES],
     corners: [Corner; 3 * FACES],
-    faces: [Face; FACES],
+    faces: [MeshFace; FACES],
 }
 
 /// Built by the compiler.
@@ -129,7 +129,7 @@ const fn corner(ring: usize, side: usize, from: usize) -> Corner {
 }
 
 const fn build() -> Solid {
-    let empty = Face {
+    let empty = MeshFace {
         first: 0,
         corners: 3,
         texture: 0,
@@ -167,7 +167,7 @@ const fn build() -> Solid {
                 solid.corners[3 * face] = corners[0];
                 solid.corners[3 * face + 1] = corners[1 + half];
                 solid.corners[3 * face + 2] = corners[2 + half];
-                solid.faces[face] = Face {
+                solid.faces[face] = MeshFace {
                     first: 3 * face as u16,
                     normal,
                     ..empty

@@ -1,7 +1,7 @@
 //! Four-cornered faces that show a whole texture.
 
 use super::surfaces::SIDE;
-use crate::{Corner, Face, Mesh, Vec3};
+use crate::{Corner, Mesh, MeshFace, Vec3};
 
 /// A square that lies `y` below the origin and extends by `half` to either side, to the front and to the
 /// back. The texture's top is far away, so that its text reads from the near edge.
@@ -37,8 +37,8 @@ pub const fn corners<const N: usize>() -> [Corner; N] {
 }
 
 /// A face of four corners.
-pub const fn face(first: u16, normal: Vec3) -> Face {
-    Face {
+pub const fn face(first: u16, normal: Vec3) -> MeshFace {
+    MeshFace {
         first,
         corners: 4,
         texture: 0,
@@ -49,7 +49,7 @@ pub const fn face(first: u16, normal: Vec3) -> Face {
 /// One, with a normal's 14 fraction bits.
 pub const ONE: i32 = 1 << 14;
 pub static ONE_FACE: [Corner; 4] = corners();
-static UPWARD: [Face; 1] = [face(0, [0, -ONE, 0])];
+static UPWARD: [MeshFace; 1] = [face(0, [0, -ONE, 0])];
 
 pub const fn lies(vertices: &'static [Vec3]) -> Mesh<'static> {
     Mesh {

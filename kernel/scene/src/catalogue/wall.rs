@@ -5,7 +5,7 @@ use super::quad::{ONE, ONE_FACE, face};
 use super::surfaces;
 use crate::colour::LEVEL_BACKGROUND;
 use crate::entry::{Colours, Cover, Entry};
-use crate::{Face, Mesh, Pose, Vec3};
+use crate::{Mesh, MeshFace, Pose, Vec3};
 
 /// The wall, swaying: the depth is constant down each column.
 pub const WALL: Entry<'static> = Entry {
@@ -34,7 +34,7 @@ static WALL_VERTICES: [Vec3; 4] = {
         [-half, half, 0],
     ]
 };
-static TOWARDS: [Face; 1] = [face(0, [0, 0, -ONE])];
+static TOWARDS: [MeshFace; 1] = [face(0, [0, 0, -ONE])];
 const MESH: Mesh<'static> = Mesh {
     vertices: &WALL_VERTICES,
     corners: &ONE_FACE,

@@ -2,7 +2,7 @@
 
 use oracle::depth::{check, models};
 use oracle::solid::pose;
-use scene::Storage;
+use render::{RenderMemory, RenderOptions};
 use texmap::{Mapper, Order};
 
 /// Checks that each pixel shows the nearest face and is written once, in `poses` poses with each of some
@@ -11,7 +11,7 @@ use texmap::{Mapper, Order};
 fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
     let poses = seeded::cases(poses);
     let mut random = seeded::generator();
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     let mut models = models(&mut random);
     random.shuffle(&mut models);
     let solids = seeded::cases(models.len());
@@ -20,7 +20,12 @@ fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
         for &(mapper, order) in mappers.iter().cycle().take(poses * mappers.len()) {
             let distance = random.i32(distances.clone());
             let pose = pose(&mut random, distance);
-            let compared = check(&mut storage, &solid, &pose, mapper, order)
+            let options = RenderOptions {
+                mapper,
+                order,
+                next: None,
+            };
+            let compared = check(&mut storage, &solid, &pose, options)
                 .unwrap_or_else(|wrong| panic!("{name} by {mapper}, {order}, {pose:?}: {wrong}"));
             pixels += compared.pixels;
             contested += compared.contested;

@@ -8,8 +8,9 @@
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::depth::nearest;
+use render::{RenderMemory, RenderOptions, SceneRenderer};
+use scene::Pose;
 use scene::catalogue::{Entry, MAX_TEXELS};
-use scene::{Pose, Stage, Storage};
 use texmap::plane::Form;
 use texmap::{Mapper, Plane};
 
@@ -17,20 +18,23 @@ use texmap::{Mapper, Plane};
 const PLACES: i64 = 8;
 
 /// Calls `look` with a scene's stage.
-fn on_stage<T>(name: &str, look: impl FnOnce(&Entry<'_>, &mut Stage<'_>) -> T) -> T {
+fn on_stage<T>(name: &str, look: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>) -> T) -> T {
     let entry = Entry::parse(name).unwrap();
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = entry.paint(&mut texels);
-    let mut storage = in_place::boxed!(Storage);
-    look(entry, &mut Stage::new(&mut storage, entry.scene(&textures)))
+    let mut storage = in_place::boxed!(RenderMemory);
+    look(
+        entry,
+        &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+    )
 }
 
 /// For each pixel that covers more than two texels, the mean of its samples: red, green and blue, 0 to 63. In
 /// other pixels hardly a texel is left out.
-fn means(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
+fn means(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
     let seen = nearest(stage, pose);
     let mut faces = Vec::new();
-    stage.polygons(pose, |number, face| {
+    stage.at(pose).faces(|number, face| {
         let face = face.unwrap();
         faces.push((number, face.plane(), face.texture));
     });
@@ -74,10 +78,17 @@ fn means(stage: &mut Stage<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
 }
 
 /// The colour error of each covered pixel.
-fn errors(stage: &mut Stage<'_>, pose: &Pose, means: &[Option<[f64; 3]>]) -> Vec<Option<[f64; 3]>> {
+fn errors(
+    stage: &mut SceneRenderer<'_>,
+    pose: &Pose,
+    means: &[Option<[f64; 3]>],
+) -> Vec<Option<[f64; 3]>> {
     let mut page = PlanarBuffer::new();
-    stage.set_mapper(Mapper::Exact);
-    stage.draw(pose, &mut page);
+    let options = RenderOptions {
+        mapper: Mapper::Exact,
+        ..RenderOptions::default()
+    };
+    stage.draw(pose, options, &mut page);
     let error = |(i, mean): (usize, &Option<[f64; 3]>)| {
         let colour = stage.palette()[usize::from(page.pixel(i % WIDTH, i / WIDTH))];
         mean.map(|mean| [0, 1, 2].map(|k| f64::from(colour[k]) - mean[k]))

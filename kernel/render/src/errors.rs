@@ -1,85 +1,77 @@
-//! Frames that show the errors of mappers.
+//! The error view: a frame that shows each pixel's error in the place of its texel.
+//!
+//! The view asks the mapper itself for the coordinates of each pixel that it would draw, so it shows the
+//! errors of the frame, and of no model of the mapper.
 
 use core::ops::Range;
 
 use modex::{Destination, HEIGHT};
 use texmap::Job;
-use texmap::plane::coordinate;
+use texmap::plane::{Form, coordinate};
 
-use super::motion::Quality;
-use super::{Stage, lit, polygons};
-use crate::Pose;
+use crate::quality::MapperChoice;
+use crate::{PosedScene, RenderOptions};
 
-impl Stage<'_> {
-    /// Draws the solid as [`Stage::draw`] does, but colours each pixel by the mapper's error there: the
+impl PosedScene<'_> {
+    /// Draws the solid as [`PosedScene::draw`] does, but colours each pixel by the mapper's error there: the
     /// larger of the differences in u and v from the exact quotients, in 2^-16 texel. Columns outside
     /// `columns` may be left out. Returns the largest error in `columns`.
     ///
-    /// The order is always polygon by polygon: this view shows errors, not costs.
+    /// The spans are always drawn polygon by polygon: this view shows errors, not costs.
     pub fn draw_errors(
-        &mut self,
-        pose: &Pose,
+        &self,
+        options: RenderOptions,
         columns: Range<u16>,
         colour: impl Fn(u32) -> u8,
         destination: &mut impl Destination,
     ) -> u32 {
-        if !self.mesh.convex {
-            self.find_visible(pose);
-        }
-        let visible = &*self.visible;
-        let quality = Quality::of(self.mapper, pose, self.next.as_ref());
+        let choice = MapperChoice::new(&options, &self.pose);
         let mut most = 0;
-        polygons(
-            &self.mesh,
-            self.mipmaps,
-            self.points,
-            pose,
-            |face_number, face| {
-                let Some(face) = face else { return };
-                let texture = lit(&self.surfaces, self.texels, face.texture);
-                let plane = face.plane();
-                let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
-                    let c = plane.c.at(x, y);
-                    let off = |found: i32, form: texmap::plane::Form, size: u16| {
-                        found.abs_diff(coordinate(form.at(x, y), c, size))
-                    };
-                    off(u, plane.a, texture.width()).max(off(v, plane.b, texture.height()))
+        self.faces.each(|number, face| {
+            let Some(face) = face else { return };
+            let texture = self.faces.surfaces.texture(face.texture);
+            let plane = face.plane();
+            let error = |(x, y): (u16, u16), (u, v): (i32, i32)| {
+                let c = plane.c.at(x, y);
+                let off = |found: i32, form: Form, size: u16| {
+                    found.abs_diff(coordinate(form.at(x, y), c, size))
                 };
-                let mut draw = |job: Job| {
-                    if job.is_column() && !columns.contains(&job.x) {
-                        return;
+                off(u, plane.a, texture.width()).max(off(v, plane.b, texture.height()))
+            };
+            let mut draw = |job: Job| {
+                if job.is_column() && !columns.contains(&job.x) {
+                    return;
+                }
+                let mut strip = Strip::new();
+                job.pixels(&texture, |place, coordinates| {
+                    let error = error(place, coordinates);
+                    if columns.contains(&place.0) {
+                        most = most.max(error);
                     }
-                    let mut run = Run::new();
-                    job.pixels(&texture, |place, coordinates| {
-                        let error = error(place, coordinates);
-                        if columns.contains(&place.0) {
-                            most = most.max(error);
-                        }
-                        run.push(place, colour(error), destination);
-                    });
-                    run.draw(destination);
-                };
-                // A face outside the legal range is not drawn in a normal frame either.
-                let _ = quality
-                    .mapper(&face)
-                    .jobs(&face, &texture, |job| match self.mesh.convex {
-                        true => draw(job),
-                        false => visible.cut(face_number, &job, &mut draw),
-                    });
-            },
-        );
+                    strip.push(place, colour(error), destination);
+                });
+                strip.draw(destination);
+            };
+            // A face outside the legal range is not drawn in a normal frame either.
+            let _ = choice
+                .mapper(&face)
+                .jobs(&face, &texture, |job| match self.visible {
+                    None => draw(job),
+                    Some(visible) => visible.cut(number, &job, &mut draw),
+                });
+        });
         most
     }
 }
 
 /// A vertical strip of pixels that is not drawn yet.
-struct Run {
+struct Strip {
     place: (u16, u16),
     colours: [u8; HEIGHT],
     len: u16,
 }
 
-impl Run {
+impl Strip {
     fn new() -> Self {
         Self {
             place: (0, 0),
@@ -114,31 +106,40 @@ impl Run {
 #[cfg(test)]
 mod tests {
     extern crate std;
-    use crate::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
-    use crate::{Pose, Stage, Storage};
+    use crate::{RenderMemory, RenderOptions, SceneRenderer};
     use modex::{PlanarBuffer, WIDTH};
+    use scene::Pose;
+    use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
     use std::boxed::Box;
     use texmap::Mapper;
 
     /// Calls `check` with a scene's entry and a stage of it.
-    fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut Stage<'_>)) {
+    fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)) {
         let entry = CATALOGUE.iter().find(|entry| entry.name == name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
         let textures = entry.paint(&mut texels);
-        let mut storage = in_place::boxed!(Storage);
-        check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
+        let mut storage = in_place::boxed!(RenderMemory);
+        check(
+            entry,
+            &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+        );
     }
 
     /// The largest error of a frame. Every pixel of the solid has an error, and no other pixel has.
-    fn largest(stage: &mut Stage<'_>, pose: &Pose) -> u32 {
+    fn largest(stage: &mut SceneRenderer<'_>, mapper: &str, pose: &Pose) -> u32 {
+        let options = RenderOptions {
+            mapper: Mapper::parse(mapper).unwrap(),
+            ..RenderOptions::default()
+        };
+        let mut posed = stage.at(pose);
         let mut drawn = Box::new(PlanarBuffer::new());
-        let stats = stage.draw(pose, &mut *drawn);
+        let stats = posed.draw(options, &mut *drawn).stats;
         let mut page = Box::new(PlanarBuffer::new());
-        let found = stage.draw_errors(pose, 0..WIDTH as u16, |_| 1, &mut *page);
+        let found = posed.draw_errors(options, 0..WIDTH as u16, |_| 1, &mut *page);
         let with = page.planes.as_flattened().iter().filter(|&&byte| byte == 1);
         assert_eq!(with.count(), stats.pixels as usize);
         // The largest error of a part is at most that of the whole.
-        assert!(stage.draw_errors(pose, 108..212, |_| 0, &mut *page) <= found);
+        assert!(posed.draw_errors(options, 108..212, |_| 0, &mut *page) <= found);
         found
     }
 
@@ -155,8 +156,7 @@ mod tests {
                 ("free", 0.0, 0.01),
                 ("exact", 0.0, 0.0),
             ] {
-                stage.set_mapper(Mapper::parse(name).unwrap());
-                let texels = f64::from(largest(stage, &entry.pose(40))) / 65_536.0;
+                let texels = f64::from(largest(stage, name, &entry.pose(40))) / 65_536.0;
                 assert!((least..=most).contains(&texels), "{name}: {texels}");
             }
         });
@@ -167,8 +167,7 @@ mod tests {
     fn hidden_surfaces_have_no_error() {
         staged("knot", |entry, stage| {
             for name in ["shifts", "row-steps", "free", "exact"] {
-                stage.set_mapper(Mapper::parse(name).unwrap());
-                assert_eq!(largest(stage, &entry.pose(40)) == 0, name == "exact");
+                assert_eq!(largest(stage, name, &entry.pose(40)) == 0, name == "exact");
             }
         });
     }

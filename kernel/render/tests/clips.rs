@@ -3,12 +3,13 @@
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::solid::{Checker, Compared, Count, Mix, Solid, length, pose};
-use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Storage, Vec3};
+use render::{RenderMemory, RenderOptions};
+use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Vec3};
 
 #[test]
 fn at_every_distance_nothing_is_dropped() {
     let mut random = seeded::generator();
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     let unit = 1 << 16;
     for solid in [
         Solid::ball(),
@@ -27,7 +28,7 @@ fn at_every_distance_nothing_is_dropped() {
                 let pose = pose(&mut random, distance);
                 solid.on_stage(&mut storage, |stage| {
                     let mut page = PlanarBuffer::new();
-                    let stats = stage.draw(&pose, &mut page);
+                    let stats = stage.draw(&pose, RenderOptions::default(), &mut page).stats;
                     assert_eq!(stats.dropped, 0, "{pose:?}");
                 });
             }
@@ -91,7 +92,7 @@ fn cut_faces_are_where_lines_of_sight_meet_them() {
 
 #[test]
 fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     let unit = 1 << 16;
     let cube = Solid::cuboid([unit; 3]);
     let mut count = Count::default();
@@ -117,7 +118,7 @@ fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
 
 #[test]
 fn beyond_the_limits_all_is_dropped_and_counted() {
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     let cube = Solid::cuboid([1 << 16; 3]);
     let mut count = Count::default();
     for (distance, dropped) in [
@@ -146,7 +147,7 @@ fn beyond_the_limits_all_is_dropped_and_counted() {
 /// Such a face is not legal, but it must do no harm.
 #[test]
 fn a_zigzag_that_clipping_gives_too_many_corners_is_dropped_and_counted() {
-    let mut storage = in_place::boxed!(Storage);
+    let mut storage = in_place::boxed!(RenderMemory);
     for (corners, dropped) in [(3, 0), (5, 0), (MAX_CORNERS, 1)] {
         let vertices: Vec<Vec3> = (0..corners as i32)
             .map(|i| {
@@ -180,7 +181,7 @@ fn meshes_that_clipping_has_no_room_for_are_refused() {
     let accepted = |solid: &Solid| {
         let solid = solid.clone();
         std::panic::catch_unwind(move || {
-            let mut storage = in_place::boxed!(Storage);
+            let mut storage = in_place::boxed!(RenderMemory);
             solid.on_stage(&mut storage, |_| ());
         })
         .is_ok()

@@ -31,17 +31,17 @@
 //! wave of w radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
 
 use modex::{HEIGHT, Palette, WIDTH};
+use scene::trig::sin;
+use scene::{FOCAL_LENGTH, Pose};
+use texmap::Texture;
 use texmap::coverage::{Axis, spans};
-use texmap::plane::{Anchor, Plane, coordinate};
-use texmap::{Face, Mapper, Texture};
+use texmap::plane::{Plane, coordinate};
 
-use super::{Stage, lit, polygons};
-use crate::pose::Orientation;
-use crate::trig::sin;
-use crate::{FOCAL_LENGTH, Pose, Vec3};
+use crate::PosedScene;
+use crate::quality::PoseChange;
 
 /// Images a second that the eye still sees one by one, not as motion. (P. Read and M.-P. Meyer, Restoration
-/// of Motion FrameName Film, 2000: 10 to 12.)
+/// of Motion Picture Film, 2000: 10 to 12.)
 pub const STEPS_A_SECOND: u32 = 12;
 
 /// Pixels from one sample to the next, in x and y.
@@ -51,14 +51,14 @@ const SAMPLES: usize = WIDTH / GRID as usize * (HEIGHT / GRID as usize);
 
 /// The motion of the visible texture in one tick: medians over the sampled pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Motion {
+pub struct TextureMotion {
     /// On the screen, in 2^-16 pixel.
     pub pixels: u32,
     /// In the texture, as a fraction of half its period, in 2^-16.
     pub part: u32,
 }
 
-impl Motion {
+impl TextureMotion {
     /// Returns the least and most pixels from frame to frame, 16.16, that the eye sees as motion. A frame
     /// lasts `ticks` ticks, 16.16. Returns `None` if nothing moves in the texture.
     pub fn sweet_spot(&self, ticks: u32, ticks_a_second: u32) -> Option<(u32, u32)> {
@@ -68,99 +68,9 @@ impl Motion {
     }
 }
 
-/// The motion from one pose of the solid to another.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Move {
-    from: (Orientation, i32),
-    to: (Orientation, i32),
-}
-
-impl Move {
-    pub fn new(from: &Pose, to: &Pose) -> Self {
-        let [from, to] = [from, to].map(|pose| (pose.orientation(), pose.distance));
-        Self { from, to }
-    }
-
-    /// The place to which a point of view space moves, to within some 2^-16 unit.
-    fn point(&self, [x, y, z]: Vec3) -> Vec3 {
-        let (from, to) = (&self.from, &self.to);
-        let [x, y, z] = to.0.turn(from.0.turn_back([x, y, z - from.1]));
-        [x, y, z + to.1]
-    }
-
-    fn anchors(&self, anchors: &[Anchor; 3]) -> [Anchor; 3] {
-        anchors.map(|anchor| Anchor {
-            position: self.point(anchor.position),
-            ..anchor
-        })
-    }
-
-    /// Whether the motion hides a mapper's errors in a face's texture: one of the face's points moves by half
-    /// a pixel or more, and the face does not move in its own plane. In its own plane the texture glides on
-    /// unchanged, and the eye sees a bend that stands still in the texture.
-    pub fn hides_errors(&self, anchors: &[Anchor; 3]) -> bool {
-        let places = anchors.map(|anchor| anchor.position.map(i64::from));
-        let ways = anchors.map(|anchor| {
-            let to = self.point(anchor.position);
-            [0, 1, 2].map(|k| i64::from(to[k]) - i64::from(anchor.position[k]))
-        });
-        // A point beside or behind the eye has no place on the screen, and it moves fast when it comes into
-        // view.
-        let moves = places.iter().zip(&ways).any(|(place, way)| {
-            2 * i64::from(FOCAL_LENGTH) * way[0].abs().max(way[1].abs()) >= place[2]
-        });
-        let [a, b] = [1, 2].map(|i| [0, 1, 2].map(|k| places[i][k] - places[0][k]));
-        let cross = [1, 2, 0].map(|i| {
-            let j = (i + 1) % 3;
-            a[i] * b[j] - a[j] * b[i]
-        });
-        // The cross product's entries are below 2^51, and below 2^24 after the shift. The square of such an
-        // entry times the square of a `way`, below 2^26, then fits.
-        let largest = cross
-            .iter()
-            .fold(0, |most, k: &i64| most.max(k.unsigned_abs()));
-        let shift = (64 - largest.leading_zeros()).saturating_sub(24);
-        let normal = cross.map(|k| i128::from(k >> shift));
-        let dot = |a: [i128; 3], b: [i128; 3]| (0..3).map(|k| a[k] * b[k]).sum::<i128>();
-        let ways = ways.map(|way| way.map(i128::from));
-        let out: i128 = ways.iter().map(|&way| dot(way, normal).pow(2)).sum();
-        let all: i128 = ways.iter().map(|&way| dot(way, way)).sum();
-        // The sine of seven degrees is an eighth.
-        moves && 64 * out > all * dot(normal, normal)
-    }
-}
-
-/// Chooses the mapper of each face.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Quality {
-    mapper: Mapper,
-    /// The faster mapper, and the motion that hides its errors.
-    lower: Option<(Mapper, Move)>,
-}
-
-impl Quality {
-    /// Full quality with `mapper`, or reduced quality where the motion from `pose` to `next` hides it.
-    pub fn of(mapper: Mapper, pose: &Pose, next: Option<&Pose>) -> Self {
-        let next = next.filter(|next| *next != pose);
-        let lower = mapper.lower().zip(next);
-        Self {
-            mapper,
-            lower: lower.map(|(lower, next)| (lower, Move::new(pose, next))),
-        }
-    }
-
-    /// The mapper for a face.
-    pub fn mapper(&self, face: &Face<'_>) -> Mapper {
-        match self.lower {
-            Some((lower, moved)) if moved.hides_errors(&face.anchors) => lower,
-            _ => self.mapper,
-        }
-    }
-}
-
 /// Half the period of a texture's root mean square frequency, 16.16 texels, at least 1. Returns `None` for a
 /// texture of one colour.
-pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u32> {
+pub(crate) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u32> {
     let sides = texture
         .tile()
         .unwrap_or((texture.width(), texture.height()));
@@ -202,52 +112,45 @@ pub(super) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u3
     Some(((1u64 << 46) / u64::from(angle.max(1))).min(1 << 31) as u32)
 }
 
-impl Stage<'_> {
-    /// Returns how the visible texture in `pose` moves to `next`, or `None` if too little of it is visible.
-    pub fn motion(&mut self, pose: &Pose, next: &Pose) -> Option<Motion> {
-        if !self.mesh.convex {
-            self.find_visible(pose);
-        }
-        let visible = &*self.visible;
-        let half_period = self.half_period?;
-        let moved = Move::new(pose, next);
+impl PosedScene<'_> {
+    /// Returns how the visible texture moves from this pose to `next`, or `None` if too little of it is
+    /// visible.
+    pub fn motion(&self, next: &Pose) -> Option<TextureMotion> {
+        let surfaces = self.faces.surfaces;
+        let half_period = surfaces.half_period()?;
+        let change = PoseChange::new(&self.pose, next);
         let (mut pixels, mut parts) = ([0; SAMPLES], [0; SAMPLES]);
         let mut count = 0;
-        polygons(
-            &self.mesh,
-            self.mipmaps,
-            self.points,
-            pose,
-            |number, face| {
-                let Some(face) = face else { return };
-                let texture = lit(&self.surfaces, self.texels, face.texture);
-                let size = (texture.width(), texture.height());
-                let before = face.plane();
-                let after = Plane::new(&moved.anchors(&face.anchors), FOCAL_LENGTH);
-                // A face outside the legal range is not visible.
-                let _ = spans(Axis::Down, face.polygon, |run| {
-                    if run.line % GRID != GRID / 2 {
-                        return;
+        self.faces.each(|number, face| {
+            let Some(face) = face else { return };
+            let texture = surfaces.texture(face.texture);
+            let size = (texture.width(), texture.height());
+            let before = face.plane();
+            let after = Plane::new(&change.anchors(&face.anchors), FOCAL_LENGTH);
+            // A face outside the legal range is not visible.
+            let _ = spans(Axis::Down, face.polygon, |run| {
+                if run.line % GRID != GRID / 2 {
+                    return;
+                }
+                for y in (run.first..run.first + run.len).filter(|y| y % GRID == GRID / 2) {
+                    let x = run.line;
+                    let seen = self
+                        .visible
+                        .is_none_or(|visible| visible.at(x, y) == Some(number));
+                    if let Some((pixel, texel)) = sample(&before, &after, size, x, y)
+                        && seen
+                        && count < SAMPLES
+                    {
+                        pixels[count] = pixel;
+                        parts[count] = ((u64::from(texel) << 16) / u64::from(half_period))
+                            .min(u64::from(u32::MAX)) as u32;
+                        count += 1;
                     }
-                    for y in (run.first..run.first + run.len).filter(|y| y % GRID == GRID / 2) {
-                        let x = run.line;
-                        let seen = self.mesh.convex || visible.at(x, y) == Some(number);
-                        if let Some((pixel, texel)) = sample(&before, &after, size, x, y)
-                            && seen
-                            && count < SAMPLES
-                        {
-                            pixels[count] = pixel;
-                            parts[count] = ((u64::from(texel) << 16) / u64::from(half_period))
-                                .min(u64::from(u32::MAX))
-                                as u32;
-                            count += 1;
-                        }
-                    }
-                });
-            },
-        );
+                }
+            });
+        });
         let median = |values: &mut [u32]| *values.select_nth_unstable(values.len() / 2).1;
-        (count > 0).then(|| Motion {
+        (count > 0).then(|| TextureMotion {
             pixels: median(&mut pixels[..count]),
             part: median(&mut parts[..count]),
         })
@@ -289,10 +192,11 @@ fn sample(before: &Plane, after: &Plane, size: (u16, u16), x: u16, y: u16) -> Op
 mod tests {
     extern crate std;
     use super::*;
-    use crate::Storage;
-    use crate::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+    use crate::{RenderMemory, RenderOptions, SceneRenderer};
+    use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
     use std::boxed::Box;
     use std::vec::Vec;
+    use texmap::Mapper;
 
     /// A grey ramp.
     fn greys() -> Palette {
@@ -332,18 +236,21 @@ mod tests {
     }
 
     /// Calls `check` with each scene's entry and a stage of it.
-    fn staged(mut check: impl FnMut(&Entry<'_>, &mut Stage<'_>)) {
-        for entry in &CATALOGUE {
+    fn staged(mut check: impl FnMut(&Entry<'_>, &mut SceneRenderer<'_>)) {
+        for entry in CATALOGUE {
             let mut texels = Box::new([0; MAX_TEXELS]);
             let textures = entry.paint(&mut texels);
-            let mut storage = in_place::boxed!(Storage);
-            check(entry, &mut Stage::new(&mut storage, entry.scene(&textures)));
+            let mut storage = in_place::boxed!(RenderMemory);
+            check(
+                entry,
+                &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+            );
         }
     }
 
     /// The median motion, found another way: a ray from each pixel to the visible face, in floating point,
     /// moves with the solid to its next place on the screen. The grid is finer.
-    fn median_by_rays(stage: &mut Stage<'_>, pose: &Pose, next: &Pose) -> f64 {
+    fn median_by_rays(stage: &mut SceneRenderer<'_>, pose: &Pose, next: &Pose) -> f64 {
         let rows = |pose: &Pose| {
             let orientation = pose.orientation();
             let columns = [0, 1, 2].map(|k| {
@@ -359,10 +266,10 @@ mod tests {
         let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
         let unit = |n: i32| f64::from(n) / 65_536.0;
         let focal = f64::from(FOCAL_LENGTH);
-        let convex = stage.mesh.convex;
         let mut faces = std::collections::HashMap::new();
         let mut at = std::collections::HashMap::new();
-        stage.polygons(pose, |number, face| {
+        let posed = stage.at(pose);
+        posed.faces(|number, face| {
             let Some(face) = face else { return };
             let [a, b, c] = face.anchors.map(|anchor| anchor.position.map(unit));
             let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
@@ -376,8 +283,7 @@ mod tests {
                 }
             });
         });
-        if !convex {
-            let visible = stage.find_visible(pose);
+        if let Some(visible) = posed.visible() {
             at.retain(|&(x, y), number| {
                 visible.at(x, y).is_some_and(|seen| {
                     *number = seen;
@@ -415,7 +321,7 @@ mod tests {
             let (mut pixels, mut ends) = (Vec::new(), Vec::new());
             for tick in (0..720).step_by(48) {
                 let (pose, next) = (entry.pose(tick), entry.pose(tick + 1));
-                let motion = stage.motion(&pose, &next).unwrap();
+                let motion = stage.at(&pose).motion(&next).unwrap();
                 let found = f64::from(motion.pixels) / 65_536.0;
                 let rays = median_by_rays(stage, &pose, &next);
                 let near = (found - rays).abs() < 0.03 + rays / 20.0;
@@ -447,29 +353,36 @@ mod tests {
     /// If a frame lasts more ticks, steps come more slowly, and the least motion grows.
     #[test]
     fn the_sweet_spot_scales_with_the_rate_of_frames() {
-        let motion = Motion {
+        let motion = TextureMotion {
             pixels: 1 << 16,
             part: 1 << 14,
         };
         assert_eq!(motion.sweet_spot(1 << 16, 60), Some((13_107, 4 << 16)));
         assert_eq!(motion.sweet_spot(5 << 16, 60), Some((1 << 16, 4 << 16)));
-        assert_eq!(Motion { part: 0, ..motion }.sweet_spot(1 << 16, 60), None);
+        assert_eq!(
+            TextureMotion { part: 0, ..motion }.sweet_spot(1 << 16, 60),
+            None
+        );
     }
 
     /// A face that turns in its own plane keeps its quality with every mapper; a face that tumbles does not.
     #[test]
     fn a_face_that_moves_in_its_own_plane_keeps_its_quality() {
         staged(|entry, stage| {
-            let mut lowered = 0;
+            let mut reduced = 0;
             for tick in (0..720).step_by(48) {
                 for name in ["exact", "within-1/4", "shifts", "row-steps", "linear-8"] {
-                    stage.set_mapper(Mapper::parse(name).unwrap());
+                    let mapper = Mapper::parse(name).unwrap();
                     let pose = entry.pose(tick);
                     let mut draw = |next| {
-                        stage.lower_for(next);
+                        let options = RenderOptions {
+                            mapper,
+                            next,
+                            ..RenderOptions::default()
+                        };
                         let mut page = Box::new(modex::PlanarBuffer::new());
-                        let stats = stage.draw(&pose, &mut *page);
-                        (stats.pixels, stage.lowered())
+                        let drawn = stage.draw(&pose, options, &mut *page);
+                        (drawn.stats.pixels, drawn.reduced)
                     };
                     let (pixels, none) = draw(None);
                     assert_eq!((none, draw(Some(pose)).1), (0, 0));
@@ -479,11 +392,11 @@ mod tests {
                         some == 0 || ["exact", "within-1/4"].contains(&name),
                         "{name}"
                     );
-                    lowered += some;
+                    reduced += some;
                 }
             }
             let in_plane = ["facing", "tilted"].contains(&entry.name);
-            assert_eq!(lowered == 0, in_plane, "{}: {lowered}", entry.name);
+            assert_eq!(reduced == 0, in_plane, "{}: {reduced}", entry.name);
         });
     }
 }
