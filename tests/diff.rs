@@ -6,8 +6,8 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use frames::dump::Dump;
-use frames::indexed::Indexed;
-use frames::screen::Screen;
+use frames::indexed::IndexedImage;
+use frames::rgb::RgbImage;
 use protocol::dump::{Header, PLANE_BYTES};
 use protocol::{Content, FrameName, Word};
 use tempfile::TempDir;
@@ -104,7 +104,7 @@ fn file(content: Content, change: impl FnOnce(&mut Dump)) -> Vec<u8> {
 }
 
 /// A PNG as a file, after `change`.
-fn png(change: impl FnOnce(&mut Indexed)) -> Vec<u8> {
+fn png(change: impl FnOnce(&mut IndexedImage)) -> Vec<u8> {
     let (mut frame, mut bytes) = (dump(Content::Page).frame(), Vec::new());
     change(&mut frame);
     frame.write_png(&mut bytes).unwrap();
@@ -270,7 +270,7 @@ fn files_that_are_no_dumps_or_frames_are_told_apart() {
     checksum.add(&huge[12..29]);
     huge[29..33].copy_from_slice(&checksum.value().to_be_bytes());
     let mut rgb = Vec::new();
-    let screen = Screen {
+    let screen = RgbImage {
         width: 1,
         height: 1,
         pixels: vec![[1, 2, 3]],
@@ -440,7 +440,7 @@ fn the_report_shows_every_pair_that_differs() {
         let copy = world.read(&format!("it differs-files/1.dump-{of}.dump"));
         assert!(copy == world.read(&format!("{folder}/1.dump")));
         let shown = fs::read(world.path(&format!("it differs-files/1.dump-{of}.png"))).unwrap();
-        let shown = Indexed::read_png(Cursor::new(shown)).unwrap();
+        let shown = IndexedImage::read_png(Cursor::new(shown)).unwrap();
         assert!(shown == Dump::read(copy.as_bytes()).unwrap().frame());
     }
     let difference = decode(&world.path("it differs-files/1.dump-difference.png"));

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::sync::LazyLock;
 
 use bench::Work;
-use study::measure::{self, Config, Cpu, Emulated, Measured, Memories};
+use study::measure::{self, BenchMemories, Cpu, EmulatedBenches, KernelFigures, MeasureConfig};
 use texmap::{Mapper, Order};
 
 use crate::ready::READY;
@@ -21,11 +21,11 @@ fn mappers(names: &[&str]) -> Vec<Mapper> {
 fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
     LazyLock::force(&READY);
     let names = ["row-passes", "affine", "exact"];
-    let measured = measure::run(&Config {
+    let measured = measure::run(&MeasureConfig {
         cpus: vec![Cpu::Baseline],
         mappers: mappers(&names),
         rounds: 1,
-        ..Config::default()
+        ..MeasureConfig::default()
     })
     .unwrap();
     let [cpu] = &measured.cpus[..] else {
@@ -71,13 +71,16 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
             a_pixel(Work::ScreenRam) <= a_pixel(Work::ScreenCard),
             "{name}"
         );
-        assert_eq!(row.runs.len(), bench::LENGTHS.len());
-        for run in &row.runs {
-            let length = run.length;
-            assert_eq!(run.draw.pixels % u64::from(length), 0, "{name}: {length}");
-            assert_eq!(run.draw.pixels, run.jobs.pixels, "{name}: {length}");
+        assert_eq!(row.spans.len(), bench::LENGTHS.len());
+        for span in &row.spans {
+            let length = span.length;
+            assert_eq!(span.draw.pixels % u64::from(length), 0, "{name}: {length}");
+            assert_eq!(span.draw.pixels, span.jobs.pixels, "{name}: {length}");
         }
-        let (shortest, longest) = (&row.runs[0].draw, &row.runs[bench::LENGTHS.len() - 1].draw);
+        let (shortest, longest) = (
+            &row.spans[0].draw,
+            &row.spans[bench::LENGTHS.len() - 1].draw,
+        );
         assert!(
             shortest.instructions_a_pixel() > longest.instructions_a_pixel(),
             "{name}: a run of one pixel pays all of its set-up"
@@ -90,8 +93,8 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
 /// The counters must not change what is drawn, and each order has its characteristic counts.
 #[test]
 fn counting_changes_no_byte() {
-    let mut memories = Memories::default();
-    let mut emulated = Emulated::new(&mut memories);
+    let mut memories = BenchMemories::default();
+    let mut emulated = EmulatedBenches::new(&mut memories);
     for &(_, mapper, _) in Mapper::ALL {
         let mut pixels = Vec::new();
         for (name, order, _) in Order::ALL {
@@ -129,12 +132,12 @@ fn counting_changes_no_byte() {
 #[ignore = "measures for minutes; run it alone"]
 fn figures() {
     LazyLock::force(&READY);
-    let measured = measure::run(&Config::default()).unwrap();
+    let measured = measure::run(&MeasureConfig::default()).unwrap();
     println!("{}", table(&measured));
 }
 
 /// Instructions a pixel and ratios of times, a line for each mapper and order.
-fn table(measured: &Measured) -> String {
+fn table(measured: &KernelFigures) -> String {
     let mut table = format!("QEMU {}\n", measured.qemu);
     for cpu in &measured.cpus {
         let bmi2 = if cpu.bmi2 { "with" } else { "without" };

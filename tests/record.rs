@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
-use frames::difference::Subject;
-use frames::indexed::Indexed;
+use frames::difference::Capture;
+use frames::indexed::IndexedImage;
 use vga::widen;
 
 use crate::ready::READY;
@@ -29,10 +29,10 @@ fn crystal_ball(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Stri
 }
 
 /// The only image of a PNG.
-fn frame(path: &Path) -> Indexed {
-    match Subject::read(path).unwrap() {
-        Subject::Png(frame) => frame,
-        Subject::Dump(_) => panic!("{} is not a PNG", path.display()),
+fn frame(path: &Path) -> IndexedImage {
+    match Capture::read(path).unwrap() {
+        Capture::Png(frame) => frame,
+        Capture::Dump(_) => panic!("{} is not a PNG", path.display()),
     }
 }
 

@@ -4,8 +4,8 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::{Args, CommandFactory, Parser, Subcommand};
-use frames::look::Look;
-use frames::write::Frames;
+use frames::options::FrameOptions;
+use frames::write::DumpOptions;
 use frames::{record, replay};
 use import::Files;
 use study::trade;
@@ -28,7 +28,7 @@ pub struct Cli {
     #[command(flatten)]
     pub boot: Boot,
     #[command(flatten)]
-    pub look: Look,
+    pub frame_options: FrameOptions,
     #[command(flatten)]
     pub model: Files,
     #[command(flatten)]
@@ -97,16 +97,16 @@ pub enum Subcommands {
     /// Boot, show each frame, and write the contents of video memory as a text that `diff` can
     /// compare, and as a PNG
     #[command(after_help = dump::HELP)]
-    Dump(Frames),
+    Dump(DumpOptions),
     /// Write the same files from the emulated VGA, without QEMU
     #[command(after_help = emulate::HELP)]
-    Emulate(Frames),
+    Emulate(DumpOptions),
     /// Record the demo: every requested frame, however slow the machine is
     #[command(after_help = recording::HELP)]
-    Record(record::Options),
+    Record(record::RecordOptions),
     /// Show many dumps or PNGs at once: in the terminal, or as a contact sheet
     #[command(after_help = replaying::HELP)]
-    Replay(replay::Options),
+    Replay(replay::ReplayOptions),
     /// Compare two dumps, two indexed PNGs, or two folders of them, and print the differences
     ///
     /// Exit codes: 0 equal; 1 different; 2 not compared.
@@ -129,7 +129,7 @@ pub enum Subcommands {
     /// Measure what accuracy costs: every mapper's error and time on each scene, as tables, plots
     /// and a page; needs a release build
     #[command(after_help = trading::HELP)]
-    Trade(trade::Options),
+    Trade(trade::TradeOptions),
     /// Write the bootable disk image
     #[command(after_help = image::HELP)]
     Image {

@@ -28,7 +28,7 @@ pub fn run(cli: Cli) -> anyhow::Result<ExitCode> {
     let Cli {
         command,
         boot: Boot { headless, vga },
-        look,
+        frame_options,
         model,
         tools: Tools { qemu, toolchain },
         qemu_arguments,
@@ -36,7 +36,7 @@ pub fn run(cli: Cli) -> anyhow::Result<ExitCode> {
     let common = Common {
         headless,
         vga,
-        look,
+        frame_options,
         files: model,
         options: Options {
             toolchain,

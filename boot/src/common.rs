@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 
-use frames::look::Look;
+use frames::options::FrameOptions;
 use import::{Files, Model};
 use qemu::{Config, Machine};
 use setup::{Options, Ready};
@@ -15,7 +15,7 @@ pub struct Common {
     /// QEMU's `-vga`.
     pub vga: String,
     /// Scene, mapper and order.
-    pub look: Look,
+    pub frame_options: FrameOptions,
     /// The files of the user's model.
     pub files: Files,
     /// Options of the set-up.

@@ -10,7 +10,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches};
-use frames::look::Named;
+use frames::options::NamedValue;
 use qemu::{Failure, Printed, Verdict};
 use scene::catalogue::Entry;
 use system::{Interrupted, say};
@@ -31,9 +31,9 @@ fn main() -> ExitCode {
         std::process::exit(error.exit_code());
     });
     // clap cannot require this of options that stand on different sides of a subcommand.
-    let needs_model = match (&cli.model.texture, cli.look.scene) {
+    let needs_model = match (&cli.model.texture, cli.frame_options.scene) {
         (Some(_), _) => Some("--texture"),
-        (_, Some(Named(Entry::LOADED))) => Some("--scene model"),
+        (_, Some(NamedValue(Entry::LOADED))) => Some("--scene model"),
         _ => None,
     };
     if let Some(option) = needs_model.filter(|_| cli.model.model.is_none()) {

@@ -11,7 +11,7 @@ use std::path::Path;
 
 use system::{Interrupted, interrupted, quote, say};
 
-use crate::difference::{Subject, compare};
+use crate::difference::{Capture, compare};
 use crate::report::Report;
 
 /// Extensions of the files to compare in a folder.
@@ -50,7 +50,7 @@ pub fn run(
     report: Option<&Path>,
     out: &mut impl Write,
 ) -> anyhow::Result<Outcome> {
-    let mut findings = Findings {
+    let mut comparison = Comparison {
         report: report.map(|_| Report::between(a, b)),
         out,
         pairs: 0,
@@ -59,8 +59,8 @@ pub fn run(
         pixels: 0,
     };
     match (a.is_dir(), b.is_dir()) {
-        (true, true) => findings.folders(a, b)?,
-        (false, false) => findings.files(a, b)?,
+        (true, true) => comparison.folders(a, b)?,
+        (false, false) => comparison.files(a, b)?,
         (a_is_folder, _) => {
             let (folder, other) = if a_is_folder { (a, b) } else { (b, a) };
             let why = match other.metadata() {
@@ -71,11 +71,11 @@ pub fn run(
                 ),
                 Err(error) => format!("{}: it cannot be read: {error}", quote::path(other)),
             };
-            findings.incomparable(&quote::path(other), &why);
+            comparison.incomparable(&quote::path(other), &why);
         }
     }
-    let outcome = findings.outcome();
-    if let (Some(html), Some(report)) = (report, findings.report) {
+    let outcome = comparison.outcome();
+    if let (Some(html), Some(report)) = (report, comparison.report) {
         report.write(html)?;
         say(format_args!("the report: {}", html.display()));
     }
@@ -83,7 +83,7 @@ pub fn run(
 }
 
 /// The results so far.
-struct Findings<'a, W> {
+struct Comparison<'a, W> {
     /// The report, if the user requested one.
     report: Option<Report>,
     out: &'a mut W,
@@ -93,7 +93,7 @@ struct Findings<'a, W> {
     pixels: usize,
 }
 
-impl<W: Write> Findings<'_, W> {
+impl<W: Write> Comparison<'_, W> {
     fn files(&mut self, a: &Path, b: &Path) -> anyhow::Result<()> {
         let (from, to) = (quote::path(a), quote::path(b));
         let name = match (a.file_name(), b.file_name()) {
@@ -181,7 +181,7 @@ impl<W: Write> Findings<'_, W> {
         b: &Path,
     ) -> anyhow::Result<()> {
         self.pairs += 1;
-        let (expected, got) = match (Subject::read(a), Subject::read(b)) {
+        let (expected, got) = match (Capture::read(a), Capture::read(b)) {
             (Ok(expected), Ok(got)) => (expected, got),
             (expected, got) => {
                 let errors = [expected.err(), got.err()];
@@ -196,8 +196,8 @@ impl<W: Write> Findings<'_, W> {
         match compare(&expected, &got) {
             Ok(None) => {
                 self.pixels += match (&expected, &got) {
-                    (Subject::Png(frame), _) | (_, Subject::Png(frame)) => frame.pixels.len(),
-                    (Subject::Dump(dump), _) => dump.pixels.len(),
+                    (Capture::Png(frame), _) | (_, Capture::Png(frame)) => frame.pixels.len(),
+                    (Capture::Dump(dump), _) => dump.pixels.len(),
                 };
                 if let Some(report) = &mut self.report {
                     report.add_equal();

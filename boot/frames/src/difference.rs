@@ -16,7 +16,7 @@ use protocol::Content;
 use protocol::dump::{MAGIC, OrNone, PLANE_BYTES};
 
 use crate::dump::Dump;
-use crate::indexed::Indexed;
+use crate::indexed::IndexedImage;
 use system::quote;
 
 /// The first bytes of every PNG.
@@ -32,14 +32,14 @@ const MAX_PIXELS: u64 = 1 << 24;
     clippy::large_enum_variant,
     reason = "either has its pixels on the heap"
 )]
-pub enum Subject {
+pub enum Capture {
     /// The contents of a VGA.
     Dump(Dump),
     /// A frame from an indexed PNG.
-    Png(Indexed),
+    Png(IndexedImage),
 }
 
-impl Subject {
+impl Capture {
     /// Reads a PNG or a dump. The content decides which, not the name.
     ///
     /// # Errors
@@ -71,7 +71,7 @@ impl Subject {
     }
 
     /// Returns the frame on the screen.
-    pub(crate) fn frame(&self) -> Cow<'_, Indexed> {
+    pub(crate) fn frame(&self) -> Cow<'_, IndexedImage> {
         match self {
             Self::Dump(dump) => Cow::Owned(dump.frame()),
             Self::Png(frame) => Cow::Borrowed(frame),
@@ -79,7 +79,7 @@ impl Subject {
     }
 }
 
-fn read_png(bytes: &[u8]) -> anyhow::Result<Indexed> {
+fn read_png(bytes: &[u8]) -> anyhow::Result<IndexedImage> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     let cut = "it is no whole PNG";
     let header = decoder.read_header_info().context(cut)?;
@@ -87,7 +87,7 @@ fn read_png(bytes: &[u8]) -> anyhow::Result<Indexed> {
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
         bail!("its header claims {width} x {height} pixels; `diff` takes up to {MAX_PIXELS}");
     }
-    Indexed::read_png(Cursor::new(bytes)).map_err(|error| {
+    IndexedImage::read_png(Cursor::new(bytes)).map_err(|error| {
         if error.is::<png::DecodingError>() {
             error.context(cut)
         } else {
@@ -102,19 +102,19 @@ fn read_png(bytes: &[u8]) -> anyhow::Result<Indexed> {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// The pixels that differ; for dumps of all memory, the bytes.
-    pub pixels: Option<Pixels>,
+    pub pixels: Option<PixelDifference>,
     /// The palette entries that differ.
-    pub palette: Option<Colours>,
+    pub palette: Option<PaletteDifference>,
     /// The fields of the dumps' headers that differ.
-    pub fields: Vec<Field>,
+    pub fields: Vec<HeaderDifference>,
 }
 
 /// The pixels, or bytes of video memory, that differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pixels {
+pub struct PixelDifference {
     /// The first difference: the leftmost on the uppermost line. In memory: the lowest plane at the lowest
     /// address.
-    pub first: Place,
+    pub first: PixelPosition,
     /// The expected value of the first difference.
     pub expected: u8,
     /// The actual value of the first difference.
@@ -135,7 +135,7 @@ pub struct Pixels {
 
 /// The place of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct PixelPosition {
     /// The plane.
     pub plane: usize,
     /// The distance from the left edge of the pixel's page.
@@ -143,12 +143,12 @@ pub struct Place {
     /// The distance from the top edge of the pixel's page.
     pub y: usize,
     /// The address in video memory, if all of it was compared.
-    pub memory: Option<Address>,
+    pub memory: Option<MemoryAddress>,
 }
 
 /// The address of a byte in video memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Address {
+pub struct MemoryAddress {
     /// The address in the plane.
     pub address: u16,
     /// The page that contains the byte; `None` past the last page.
@@ -170,7 +170,7 @@ pub struct Bounds {
 
 /// The palette entries that differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Colours {
+pub struct PaletteDifference {
     /// The index of the first entry that differs.
     pub first: usize,
     /// The expected colour of the first entry; `None` if the expected palette is shorter.
@@ -185,7 +185,7 @@ pub struct Colours {
 
 /// A field of the dumps' headers that differs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Field {
+pub struct HeaderDifference {
     /// The field's label.
     pub name: &'static str,
     /// The expected value.
@@ -196,25 +196,25 @@ pub struct Field {
 
 /// The layout of a subject's pixels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
+pub(crate) struct PixelLayout {
     /// Pixels in a line.
     pub width: usize,
     /// The lines of a page, if the pixels are all of video memory; `None` for a single page.
     pub memory: Option<usize>,
 }
 
-impl Shape {
-    pub fn place(&self, i: usize) -> Place {
+impl PixelLayout {
+    pub fn place(&self, i: usize) -> PixelPosition {
         let (x, y) = (i % self.width, i / self.width);
         let (y, memory) = match self.memory {
             None => (y, None),
             Some(height) => {
                 let page = Some(y / height).filter(|&page| page < self.pages(height));
                 let address = (i / 4) as u16;
-                (y % height, Some(Address { address, page }))
+                (y % height, Some(MemoryAddress { address, page }))
             }
         };
-        Place {
+        PixelPosition {
             plane: i & 3,
             x,
             y,
@@ -228,14 +228,14 @@ impl Shape {
     }
 
     /// Compares pixels of this layout; `None` if they are equal.
-    pub fn compare(&self, expected: &[u8], got: &[u8]) -> Option<Pixels> {
+    pub fn compare(&self, expected: &[u8], got: &[u8]) -> Option<PixelDifference> {
         let mut planes = [0; 4];
         let mut pages = match self.memory {
             Some(height) => vec![0; self.pages(height) + 1],
             None => Vec::new(),
         };
         let past = pages.len().saturating_sub(1);
-        let mut found: Option<Pixels> = None;
+        let mut found: Option<PixelDifference> = None;
         for (i, (&expected, &got)) in expected.iter().zip(got).enumerate() {
             if expected == got {
                 continue;
@@ -246,7 +246,7 @@ impl Shape {
                 pages[memory.page.unwrap_or(past)] += 1;
             }
             let (x, y) = (i % self.width, i / self.width);
-            let pixels = found.get_or_insert(Pixels {
+            let pixels = found.get_or_insert(PixelDifference {
                 first: place,
                 expected,
                 got,
@@ -270,7 +270,7 @@ impl Shape {
             };
         }
         let found = found?;
-        Some(Pixels {
+        Some(PixelDifference {
             count: planes.iter().sum(),
             of: expected.len(),
             planes,
@@ -285,19 +285,19 @@ impl Shape {
 /// # Errors
 /// Subjects that cannot be compared: different contents, sizes or models, or palettes that hold the same
 /// colours in a different order. Some programs reorder a PNG's palette, and the indices then mean nothing.
-pub fn compare(expected: &Subject, got: &Subject) -> anyhow::Result<Option<Difference>> {
+pub fn compare(expected: &Capture, got: &Capture) -> anyhow::Result<Option<Difference>> {
     let difference = match (expected, got) {
-        (Subject::Dump(expected), Subject::Dump(got)) => compare_dumps(expected, got)?,
+        (Capture::Dump(expected), Capture::Dump(got)) => compare_dumps(expected, got)?,
         (expected, got) => {
             let (expected, got) = (expected.frame(), got.frame());
             same_size((expected.width, expected.height), (got.width, got.height))?;
             same_order(&expected.palette, &got.palette)?;
-            let shape = Shape {
+            let layout = PixelLayout {
                 width: expected.width,
                 memory: None,
             };
             Difference {
-                pixels: shape.compare(&expected.pixels, &got.pixels),
+                pixels: layout.compare(&expected.pixels, &got.pixels),
                 palette: compare_palettes(&expected.palette, &got.palette),
                 fields: Vec::new(),
             }
@@ -351,17 +351,17 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
             format!("{:04x}", b.start),
         ),
     ];
-    let field = |(name, expected, got)| Field {
+    let field = |(name, expected, got)| HeaderDifference {
         name,
         expected,
         got,
     };
-    let shape = Shape {
+    let layout = PixelLayout {
         width: a.width.into(),
         memory: (a.content == Content::Memory).then_some(a.height.into()),
     };
     Ok(Difference {
-        pixels: shape.compare(&expected.pixels, &got.pixels),
+        pixels: layout.compare(&expected.pixels, &got.pixels),
         palette: compare_palettes(&expected.palette, &got.palette),
         fields: fields
             .into_iter()
@@ -402,18 +402,18 @@ fn same_order(expected: &[Rgb6], got: &[Rgb6]) -> anyhow::Result<()> {
         bail!(
             "the palettes hold the same colours in another order (entry {entry:02x}: expected {}, \
              got {}); indices can't be compared",
-            Colour(*a),
-            Colour(*b)
+            HexColour(*a),
+            HexColour(*b)
         );
     }
     Ok(())
 }
 
-fn compare_palettes(expected: &[Rgb6], got: &[Rgb6]) -> Option<Colours> {
+fn compare_palettes(expected: &[Rgb6], got: &[Rgb6]) -> Option<PaletteDifference> {
     let of = expected.len().max(got.len());
     let mut entries = differing_entries(expected, got);
     let first = entries.next()?;
-    Some(Colours {
+    Some(PaletteDifference {
         first,
         expected: expected.get(first).copied(),
         got: got.get(first).copied(),
@@ -429,9 +429,9 @@ pub(crate) fn differing_entries(expected: &[Rgb6], got: &[Rgb6]) -> impl Iterato
 }
 
 /// A colour, in the notation of dumps.
-pub(crate) struct Colour(pub Rgb6);
+pub(crate) struct HexColour(pub Rgb6);
 
-impl fmt::Display for Colour {
+impl fmt::Display for HexColour {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [red, green, blue] = self.0;
         write!(f, "{red:02x}{green:02x}{blue:02x}")
@@ -440,7 +440,7 @@ impl fmt::Display for Colour {
 
 /// Returns an entry's colour in the notation of dumps, or `nothing` for a missing entry.
 pub(crate) fn colour(colour: Option<Rgb6>) -> String {
-    colour.map_or("nothing".into(), |colour| Colour(colour).to_string())
+    colour.map_or("nothing".into(), |colour| HexColour(colour).to_string())
 }
 
 impl Difference {
@@ -469,7 +469,7 @@ fn differ(f: &mut fmt::Formatter<'_>, count: usize, of: usize, what: &str) -> fm
     write!(f, "{count} of {of} {what} differ{s}")
 }
 
-impl fmt::Display for Pixels {
+impl fmt::Display for PixelDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let memory = !self.pages.is_empty();
         let what = if memory { "bytes" } else { "pixels" };
@@ -499,7 +499,7 @@ impl fmt::Display for Pixels {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for PixelPosition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             plane,
@@ -509,7 +509,7 @@ impl fmt::Display for Place {
         } = self;
         match memory {
             None => write!(f, "plane {plane}, x {x}, y {y}"),
-            Some(Address { address, page }) => {
+            Some(MemoryAddress { address, page }) => {
                 write!(f, "plane {plane}, address {address:04x} ")?;
                 match page {
                     Some(page) => write!(f, "(page {page}, x {x}, y {y})"),
@@ -527,7 +527,7 @@ impl fmt::Display for Bounds {
     }
 }
 
-impl fmt::Display for Colours {
+impl fmt::Display for PaletteDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         differ(f, self.count, self.of, "palette entries")?;
         let (expected, got) = (colour(self.expected), colour(self.got));
@@ -536,7 +536,7 @@ impl fmt::Display for Colours {
     }
 }
 
-impl fmt::Display for Field {
+impl fmt::Display for HeaderDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             name,
@@ -586,7 +586,7 @@ mod tests {
         let expected = dump(content);
         let mut got = expected.clone();
         change(&mut got);
-        let [expected, got] = [expected, got].map(Subject::Dump);
+        let [expected, got] = [expected, got].map(Capture::Dump);
         match compare(&expected, &got) {
             Ok(None) => "equal".into(),
             Ok(Some(difference)) => difference.to_string(),
@@ -698,17 +698,17 @@ mod tests {
         for content in [Content::Page, Content::Memory] {
             let dump = dump(content);
             let mut frame = dump.frame();
-            let dump = Subject::Dump(dump);
-            let same = Subject::Png(frame.clone());
+            let dump = Capture::Dump(dump);
+            let same = Capture::Png(frame.clone());
             assert_eq!(compare(&dump, &same).unwrap(), None);
             assert_eq!(compare(&same, &dump).unwrap(), None);
             frame.pixels[321] ^= 1;
-            let difference = compare(&Subject::Png(frame), &dump);
+            let difference = compare(&Capture::Png(frame), &dump);
             let pixels = difference.unwrap().unwrap().pixels.unwrap();
             assert_eq!((pixels.count, pixels.of), (1, 320 * 240));
             assert_eq!(
                 pixels.first,
-                Place {
+                PixelPosition {
                     plane: 1,
                     x: 1,
                     y: 1,
@@ -724,8 +724,8 @@ mod tests {
         let with = |change: &dyn Fn(&mut Vec<Rgb6>)| {
             let mut other = frame.clone();
             change(&mut other.palette);
-            let subject = Subject::Png(frame.clone());
-            compare(&subject, &Subject::Png(other))
+            let subject = Capture::Png(frame.clone());
+            compare(&subject, &Capture::Png(other))
         };
         let error = with(&|palette| palette.swap(3, 200)).unwrap_err();
         assert_eq!(

@@ -11,7 +11,7 @@ use modex::Palette;
 use protocol::dump::{COLOURS_A_LINE, Header, MAGIC, MAX_WIDTH, PLANE_BYTES, VERSION, Whole};
 use protocol::{Content, FrameName, Lines, Motion, Word};
 
-use crate::indexed::Indexed;
+use crate::indexed::IndexedImage;
 use system::quote::quoted;
 
 /// The contents of a VGA: its palette, and the pixels of a page or of all video memory.
@@ -33,27 +33,27 @@ impl fmt::Debug for Dump {
 
 /// Why a text is not a valid dump.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NoDump {
+pub struct DumpError {
     /// The number of the invalid line, counted from 1.
     pub line: usize,
     /// What is wrong with the line.
     pub why: String,
 }
 
-impl fmt::Display for NoDump {
+impl fmt::Display for DumpError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "line {}: {}", self.line, self.why)
     }
 }
 
-impl std::error::Error for NoDump {}
+impl std::error::Error for DumpError {}
 
 impl Dump {
     /// Reads a dump from a file's bytes: lines with their checksums, ended by LF or CR LF.
     ///
     /// # Errors
     /// The first invalid line.
-    pub fn read(bytes: &[u8]) -> Result<Self, NoDump> {
+    pub fn read(bytes: &[u8]) -> Result<Self, DumpError> {
         let (mut lines, mut texts) = (Lines::new(), Vec::new());
         for &byte in bytes {
             let Some(line) = lines.push(byte) else {
@@ -68,16 +68,16 @@ impl Dump {
             // For a file of an entirely different kind, the error says that it is not a dump, not what its
             // bytes are.
             let first = texts.is_empty();
-            texts.push(text.map_err(|why| NoDump {
+            texts.push(text.map_err(|why| DumpError {
                 line: texts.len() + 1,
-                why: if first { no_dump(&why) } else { why },
+                why: if first { not_a_dump(&why) } else { why },
             })?);
         }
         if !bytes.is_empty() && !bytes.ends_with(b"\n") {
-            return Err(NoDump {
+            return Err(DumpError {
                 line: texts.len() + 1,
                 why: match texts.is_empty() {
-                    true => no_dump("it has no end"),
+                    true => not_a_dump("it has no end"),
                     false => "it is cut short: the line has no end".into(),
                 },
             });
@@ -89,13 +89,13 @@ impl Dump {
     ///
     /// # Errors
     /// As [`Dump::read`].
-    pub fn from_lines(lines: &[impl AsRef<str>]) -> Result<Self, NoDump> {
-        let mut reader = Reader {
+    pub fn from_lines(lines: &[impl AsRef<str>]) -> Result<Self, DumpError> {
+        let mut reader = DumpReader {
             lines: lines.iter().map(AsRef::as_ref).collect(),
             read: 0,
             whole: Whole::default(),
         };
-        reader.dump().map_err(|why| NoDump {
+        reader.dump().map_err(|why| DumpError {
             line: reader.read.max(1),
             why,
         })
@@ -159,7 +159,7 @@ impl Dump {
     }
 
     /// Returns the frame on the screen.
-    pub fn frame(&self) -> Indexed {
+    pub fn frame(&self) -> IndexedImage {
         let Header {
             width,
             height,
@@ -176,7 +176,7 @@ impl Dump {
                 pixels
             }
         };
-        Indexed {
+        IndexedImage {
             width: width.into(),
             height: height.into(),
             palette: self.palette.to_vec(),
@@ -188,18 +188,18 @@ impl Dump {
 /// The oldest version of the format that can be read.
 const OLDEST: u32 = 3;
 
-fn no_dump(why: &str) -> String {
+fn not_a_dump(why: &str) -> String {
     format!("it is no dump: it does not begin with '{MAGIC} {VERSION}' ({why})")
 }
 
 /// Parses the lines of a dump, one after the other.
-struct Reader<'a> {
+struct DumpReader<'a> {
     lines: Vec<&'a str>,
     read: usize,
     whole: Whole,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> DumpReader<'a> {
     /// Returns the rest of the next line, which must begin with `label`.
     fn line(&mut self, label: &str) -> Result<&'a str, String> {
         let found = self.lines.get(self.read).copied();
@@ -216,7 +216,7 @@ impl<'a> Reader<'a> {
     }
 
     fn dump(&mut self) -> Result<Dump, String> {
-        let version = self.line(MAGIC).map_err(|why| no_dump(&why))?;
+        let version = self.line(MAGIC).map_err(|why| not_a_dump(&why))?;
         let version = match version.parse() {
             Ok(version @ OLDEST..=VERSION) => version,
             _ => {

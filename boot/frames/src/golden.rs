@@ -40,12 +40,12 @@ use scene::catalogue::Entry;
 use serde::Deserialize;
 use texmap::{Mapper, Order};
 
-use crate::card::{self, Card, Emulated};
-use crate::difference::{Difference, Subject, compare};
-use crate::indexed::Indexed;
-use crate::look::{Look, Named};
+use crate::backend::{self, Backend, EmulatedDemo};
+use crate::difference::{Capture, Difference, compare};
+use crate::indexed::IndexedImage;
+use crate::options::{FrameOptions, NamedValue};
 use crate::report::Report;
-use crate::screen::Screen;
+use crate::rgb::RgbImage;
 use system::Step;
 use system::quote::{printable, quoted};
 use system::write_atomically;
@@ -60,7 +60,7 @@ pub struct Golden {
     /// The frames to show after `hold`; the golden is the last.
     pub show: Vec<FrameName>,
     /// The options to draw with.
-    pub look: Look,
+    pub options: FrameOptions,
     /// The path of the golden's PNG.
     pub png: PathBuf,
 }
@@ -125,17 +125,17 @@ impl Golden {
         if show.is_empty() {
             return Err(anyhow::anyhow!("it shows nothing")).with_context(wrong);
         }
-        let look = Look {
+        let options = FrameOptions {
             scene: known("scene", description.scene, Entry::parse)
                 .with_context(wrong)?
-                .map(|entry| Named(entry.name)),
+                .map(|entry| NamedValue(entry.name)),
             mapper: known("mapper", description.mapper, Mapper::parse).with_context(wrong)?,
             order: known("order", description.order, Order::parse)
                 .with_context(wrong)?
-                .map(Named),
+                .map(NamedValue),
         };
         Ok(Self {
-            look,
+            options,
             name: path
                 .file_stem()
                 .unwrap_or_default()
@@ -151,11 +151,11 @@ impl Golden {
     ///
     /// # Errors
     /// A file that cannot be read or is not an indexed PNG.
-    pub fn frame(&self) -> anyhow::Result<Option<Indexed>> {
+    pub fn frame(&self) -> anyhow::Result<Option<IndexedImage>> {
         let wrong = || format!("{} is no golden", self.png.display());
         match File::open(&self.png) {
             Ok(file) => Ok(Some(
-                Indexed::read_png(BufReader::new(file)).with_context(wrong)?,
+                IndexedImage::read_png(BufReader::new(file)).with_context(wrong)?,
             )),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error).with_context(wrong),
@@ -190,7 +190,7 @@ pub struct Finding {
     /// Which two things differ, and how.
     pub words: String,
     /// The expected and the actual side with their difference, if images can show it.
-    evidence: Option<Box<(Subject, Subject, Difference)>>,
+    evidence: Option<Box<(Capture, Capture, Difference)>>,
 }
 
 impl fmt::Display for Finding {
@@ -223,16 +223,16 @@ impl Findings {
     pub fn check_golden(
         &mut self,
         golden: &Golden,
-        emulated: &mut Emulated<'_>,
+        emulated: &mut EmulatedDemo<'_>,
     ) -> anyhow::Result<()> {
-        emulated.show_as(&golden.look, &golden.show)?;
-        let drawn = Subject::Dump(emulated.dump(Content::Page)?);
+        emulated.show_with(&golden.options, &golden.show)?;
+        let drawn = Capture::Dump(emulated.dump(Content::Page)?);
         match golden.frame() {
             Ok(Some(frame)) => {
                 self.compare(
                     golden,
                     "the emulated card and the golden",
-                    &Subject::Png(frame),
+                    &Capture::Png(frame),
                     &drawn,
                 );
             }
@@ -252,12 +252,12 @@ impl Findings {
     pub fn check_cards(
         &mut self,
         golden: &Golden,
-        emulated: &mut Emulated<'_>,
-        machine: &mut impl Card,
+        emulated: &mut EmulatedDemo<'_>,
+        machine: &mut impl Backend,
         transfer: Transfer,
     ) -> anyhow::Result<()> {
-        emulated.show_as(&golden.look, &golden.show)?;
-        machine.show_as(&golden.look, &golden.show)?;
+        emulated.show_with(&golden.options, &golden.show)?;
+        machine.show_with(&golden.options, &golden.show)?;
         // The kernel has answered and waits for the next command, so it touches no video memory now.
         let screen = machine.screen()?;
         let held = self.check_memory(golden, emulated, machine)?;
@@ -271,8 +271,8 @@ impl Findings {
             );
         }
         let [expected, got] = [
-            emulated.ask(Command::Registers)?,
-            machine.ask(Command::Registers)?,
+            emulated.send(Command::Registers)?,
+            machine.send(Command::Registers)?,
         ];
         for (expected, got) in expected.iter().zip(&got) {
             // QEMU has no PEL Mask.
@@ -293,13 +293,13 @@ impl Findings {
     fn check_memory(
         &mut self,
         golden: &Golden,
-        emulated: &mut Emulated<'_>,
-        machine: &mut impl Card,
+        emulated: &mut EmulatedDemo<'_>,
+        machine: &mut impl Backend,
     ) -> anyhow::Result<bool> {
         // Computed from outside the emulated VGA, so that the program, which both VGAs run, has no part in
         // it.
         let expected = emulated.dump(Content::Memory)?.checksums();
-        let got = machine.ask(Command::Checksums(Content::Memory))?;
+        let got = machine.send(Command::Checksums(Content::Memory))?;
         if got == expected {
             return Ok(true);
         }
@@ -321,17 +321,17 @@ impl Findings {
         &mut self,
         golden: &Golden,
         content: Content,
-        emulated: &mut Emulated<'_>,
-        machine: &mut impl Card,
+        emulated: &mut EmulatedDemo<'_>,
+        machine: &mut impl Backend,
     ) -> anyhow::Result<()> {
-        let expected = Subject::Dump(emulated.dump(content)?);
-        let got = Subject::Dump(machine.dump(content)?);
+        let expected = Capture::Dump(emulated.dump(content)?);
+        let got = Capture::Dump(machine.dump(content)?);
         self.compare(golden, "QEMU and the emulated card", &expected, &got);
         Ok(())
     }
 
     /// Compares two subjects and collects a difference under the golden's name.
-    pub fn compare(&mut self, golden: &Golden, what: &str, expected: &Subject, got: &Subject) {
+    pub fn compare(&mut self, golden: &Golden, what: &str, expected: &Capture, got: &Capture) {
         let words = match compare(expected, got) {
             Ok(None) => return,
             Ok(Some(difference)) => {
@@ -407,8 +407,8 @@ impl Findings {
 }
 
 /// Describes how two screens differ; `None` if they are equal.
-fn difference(expected: &Screen, got: &Screen) -> Option<String> {
-    let size = |screen: &Screen| (screen.width, screen.height);
+fn difference(expected: &RgbImage, got: &RgbImage) -> Option<String> {
+    let size = |screen: &RgbImage| (screen.width, screen.height);
     if size(expected) != size(got) {
         return Some(format!("{:?} dots and {:?}", size(got), size(expected)));
     }
@@ -429,27 +429,27 @@ fn difference(expected: &Screen, got: &Screen) -> Option<String> {
 /// # Errors
 /// A VGA that fails, a difference between QEMU's VGA and the emulated VGA (then no PNG is written), a file
 /// that cannot be written.
-pub fn bless<C: Card>(
+pub fn bless<C: Backend>(
     folder: &Path,
     report: &Path,
     boot: impl FnOnce() -> anyhow::Result<C>,
     leave: impl FnOnce(C) -> anyhow::Result<()>,
     mut say: impl FnMut(&str),
 ) -> anyhow::Result<usize> {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory)?;
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory)?;
     let mut changes = Vec::new();
     let mut differ = Findings::default();
     for golden in find(folder)? {
-        emulated.show_as(&golden.look, &golden.show)?;
+        emulated.show_with(&golden.options, &golden.show)?;
         let drawn = emulated.dump(Content::Page)?;
         // A PNG that cannot be read is blessed again, like a missing PNG.
         let before = golden.frame().unwrap_or_default();
         match before {
             Some(before) if before == drawn.frame() => continue,
             Some(before) => {
-                let expected = Subject::Png(before);
-                differ.compare(&golden, "changes", &expected, &Subject::Dump(drawn.clone()));
+                let expected = Capture::Png(before);
+                differ.compare(&golden, "changes", &expected, &Capture::Dump(drawn.clone()));
                 if let Some(finding) = differ.found.last() {
                     say(&finding.to_string());
                 }

@@ -9,7 +9,7 @@ use vga::widen;
 
 /// A frame whose pixels are indices into its palette.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Indexed {
+pub struct IndexedImage {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
@@ -20,13 +20,13 @@ pub struct Indexed {
     pub pixels: Vec<u8>,
 }
 
-impl fmt::Debug for Indexed {
+impl fmt::Debug for IndexedImage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a frame of {} x {}", self.width, self.height)
     }
 }
 
-impl Indexed {
+impl IndexedImage {
     /// Writes an indexed PNG with 8 bits per pixel.
     ///
     /// # Errors

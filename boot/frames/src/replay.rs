@@ -13,16 +13,16 @@ use console::Term;
 use scene::font;
 
 use crate::comparison::list;
-use crate::difference::Subject;
-use crate::indexed::Indexed;
-use crate::screen::Screen;
+use crate::difference::Capture;
+use crate::indexed::IndexedImage;
+use crate::rgb::RgbImage;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
 /// Which frames to show, and how.
 #[derive(Args, Clone, Debug)]
-pub struct Options {
+pub struct ReplayOptions {
     /// Dumps, indexed PNGs, or folders of them; if a folder has a dump and a PNG of the same name, the dump
     /// is shown
     #[arg(required = true)]
@@ -51,7 +51,7 @@ const LINE: usize = font::HEIGHT + 3;
 /// twice the font's size, and 26 letters fit.
 const PER_SCALE: usize = 160;
 
-impl Options {
+impl ReplayOptions {
     /// Plays the frames, or writes the sheet and passes its path to `wrote`.
     ///
     /// # Errors
@@ -68,7 +68,7 @@ impl Options {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            frames.push(Subject::read(file)?.frame().into_owned());
+            frames.push(Capture::read(file)?.frame().into_owned());
             step.at(done);
         }
         drop(step);
@@ -106,8 +106,8 @@ impl Options {
         Ok(files)
     }
 
-    fn play(&self, frames: &[Indexed]) -> anyhow::Result<()> {
-        let screen = Alternate::enter()?;
+    fn play(&self, frames: &[IndexedImage]) -> anyhow::Result<()> {
+        let screen = AlternateScreen::enter()?;
         let time = Duration::from_secs(1) / self.rate;
         let mut due = Instant::now();
         loop {
@@ -135,9 +135,9 @@ const RESET: &str = "\x1b[0m";
 const ERASE: &str = "\x1b[J";
 
 /// The terminal's alternate screen. Dropping it restores the terminal's contents.
-struct Alternate;
+struct AlternateScreen;
 
-impl Alternate {
+impl AlternateScreen {
     fn enter() -> anyhow::Result<Self> {
         let this = Self;
         this.write("\x1b[?1049h\x1b[?25l\x1b[2J")?;
@@ -151,7 +151,7 @@ impl Alternate {
     }
 }
 
-impl Drop for Alternate {
+impl Drop for AlternateScreen {
     fn drop(&mut self) {
         // If the terminal is gone, there is nothing to restore.
         let _ = self.write("\x1b[?25h\x1b[?1049l");
@@ -159,12 +159,12 @@ impl Drop for Alternate {
 }
 
 /// Returns a pixel's colour, 8 bits per component.
-fn colour(frame: &Indexed, x: usize, y: usize) -> [u8; 3] {
+fn colour(frame: &IndexedImage, x: usize, y: usize) -> [u8; 3] {
     frame.palette[usize::from(frame.pixels[y * frame.width + x])].map(widen)
 }
 
 /// Shrinks a frame to `width` x `height`. Each pixel is the mean of the pixels that it replaces.
-fn shrunk(frame: &Indexed, width: usize, height: usize) -> Screen {
+fn shrunk(frame: &IndexedImage, width: usize, height: usize) -> RgbImage {
     let mut pixels = Vec::with_capacity(width * height);
     for j in 0..height {
         for i in 0..width {
@@ -185,7 +185,7 @@ fn shrunk(frame: &Indexed, width: usize, height: usize) -> Screen {
             pixels.push(sum.map(|sum| ((sum + count / 2) / count) as u8));
         }
     }
-    Screen {
+    RgbImage {
         width,
         height,
         pixels,
@@ -193,7 +193,7 @@ fn shrunk(frame: &Indexed, width: usize, height: usize) -> Screen {
 }
 
 /// Returns a frame as half-block characters, two pixels each, as large as fits.
-fn in_blocks(frame: &Indexed, columns: usize, rows: usize) -> String {
+fn in_blocks(frame: &IndexedImage, columns: usize, rows: usize) -> String {
     let (columns, rows) = (columns.max(1), rows.max(1));
     // A terminal's character is about twice as high as wide, so its two halves are about square.
     let width = columns
@@ -250,7 +250,7 @@ fn cut(name: &str, letters: usize) -> String {
 }
 
 /// Writes text on a sheet. The text must lie completely on the sheet.
-fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) {
+fn write(sheet: &mut RgbImage, text: &str, left: usize, top: usize, scale: usize) {
     for (i, letter) in text.chars().enumerate() {
         let rows = font::glyph(letter);
         for (y, x) in (0..font::HEIGHT * scale)
@@ -263,9 +263,9 @@ fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) 
 }
 
 /// Returns a sheet of all frames, row by row, with their names below.
-fn lay_out(frames: &[Indexed], names: &[String]) -> Screen {
+fn lay_out(frames: &[IndexedImage], names: &[String]) -> RgbImage {
     let across = (1..).find(|n| n * n >= frames.len()).unwrap_or(1);
-    let most = |of: fn(&Indexed) -> usize| frames.iter().map(of).max().unwrap_or(1);
+    let most = |of: fn(&IndexedImage) -> usize| frames.iter().map(of).max().unwrap_or(1);
     let (wide, high) = (most(|p| p.width), most(|p| p.height));
     // Full size, if it fits.
     let cell_width = wide.min((SHEET_WIDTH / across).saturating_sub(GAP)).max(1);
@@ -273,7 +273,7 @@ fn lay_out(frames: &[Indexed], names: &[String]) -> Screen {
     let down = frames.len().div_ceil(across);
     let scale = (cell_width / PER_SCALE).max(1);
     let pitch = cell_height + LINE * scale + GAP;
-    let mut sheet = Screen {
+    let mut sheet = RgbImage {
         width: GAP + across * (cell_width + GAP),
         height: GAP + down * pitch,
         pixels: Vec::new(),
@@ -300,8 +300,8 @@ mod tests {
     use super::*;
 
     /// Returns a frame whose left half is black and whose right half is white.
-    fn halves(width: usize, height: usize) -> Indexed {
-        Indexed {
+    fn halves(width: usize, height: usize) -> IndexedImage {
+        IndexedImage {
             width,
             height,
             palette: vec![[0; 3], [63; 3]],

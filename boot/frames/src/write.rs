@@ -10,16 +10,16 @@ use anyhow::Context;
 use clap::{ArgAction, Args};
 use protocol::{Command, Content, FrameName, Motion};
 
-use crate::card::Card;
-use crate::look::Look;
+use crate::backend::Backend;
+use crate::options::FrameOptions;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 
 /// Which frames to write, how much of video memory, and where to.
 #[derive(Args, Clone, Debug)]
-pub struct Frames {
+pub struct DumpOptions {
     #[command(flatten)]
-    which: Which,
+    which: FrameSelection,
     /// Draw in reduced quality, as for a solid that moves this much in one tick: the changes of the three
     /// angles and of the distance, in hex and modulo 2^32, as on the line `motion` of a dump
     #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
@@ -35,11 +35,11 @@ pub struct Frames {
 
 #[derive(Args, Clone, Debug)]
 #[group(required = true, multiple = true)]
-struct Which {
+struct FrameSelection {
     /// The frame with this number; can be repeated
     #[arg(long = "frame", value_name = "N")]
     single: Vec<u32>,
-    /// Frames A up to B, excluding B (A..=B includes B)
+    /// DumpOptions A up to B, excluding B (A..=B includes B)
     #[arg(long = "frames", value_name = "A..B", value_parser = range)]
     ranges: Vec<RangeInclusive<u32>>,
     /// The solid in this pose: yaw, pitch and roll as 32-bit fractions of a turn and the distance in 16.16
@@ -76,10 +76,10 @@ pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
         .ok_or_else(|| "there is no frame in it".into())
 }
 
-impl Frames {
+impl DumpOptions {
     /// Returns the number of frames, and the frames.
     fn frames(&self) -> (u64, impl Iterator<Item = FrameName>) {
-        let Which {
+        let FrameSelection {
             single,
             ranges,
             pose,
@@ -117,15 +117,15 @@ impl Frames {
         })
     }
 
-    /// Shows each frame on `card`, drawn with the options in `look`, and writes its dump and its PNG. `wrote`
+    /// Shows each frame on `card`, drawn with the options in `options`, and writes its dump and its PNG. `wrote`
     /// receives the path of each file.
     ///
     /// # Errors
     /// The VGA fails or a file cannot be written; the files written before are complete.
     pub fn write(
         &self,
-        card: &mut impl Card,
-        look: &Look,
+        card: &mut impl Backend,
+        options: &FrameOptions,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
     ) -> anyhow::Result<()> {
         std::fs::create_dir_all(&self.out)
@@ -142,8 +142,8 @@ impl Frames {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            card.show_as(look, &[])?;
-            card.ask(match motion {
+            card.show_with(options, &[])?;
+            card.send(match motion {
                 Some(motion) => Command::ShowMoving(frame, motion),
                 None => Command::Show(frame),
             })?;
@@ -188,17 +188,17 @@ mod tests {
     use texmap::Mapper;
 
     use super::*;
-    use crate::card::{self, Emulated};
+    use crate::backend::{self, EmulatedDemo};
     use crate::dump::Dump;
-    use crate::look::Named;
+    use crate::options::NamedValue;
 
     /// Takes the motion of a frame in reduced quality from its header, and draws the same bytes again.
     #[test]
     fn a_frame_of_reduced_quality_is_drawn_again_from_its_header() {
-        let mut memory = card::memory();
-        let mut card = Emulated::new(&mut memory).unwrap();
+        let mut memory = backend::memory();
+        let mut card = EmulatedDemo::new(&mut memory).unwrap();
         for line in ["scene cube", "mapper exact", "steer 5 quality", "show at 9"] {
-            card.ask(Command::parse(line).unwrap()).unwrap();
+            card.send(Command::parse(line).unwrap()).unwrap();
         }
         let shown = card.dump(Content::Page).unwrap();
         assert_eq!(shown.header.frame, Some(FrameName::Number(9)));
@@ -210,8 +210,8 @@ mod tests {
             distance,
         } = motion;
         let folder = tempfile::tempdir().unwrap();
-        let frames = |motion| Frames {
-            which: Which {
+        let frames = |motion| DumpOptions {
+            which: FrameSelection {
                 single: vec![9],
                 ranges: Vec::new(),
                 pose: Vec::new(),
@@ -220,8 +220,8 @@ mod tests {
             all: false,
             out: folder.path().into(),
         };
-        let look = Look {
-            scene: Some(Named("cube")),
+        let options = FrameOptions {
+            scene: Some(NamedValue("cube")),
             mapper: Mapper::parse("exact"),
             order: None,
         };
@@ -231,7 +231,7 @@ mod tests {
                 files.push(file.to_path_buf());
                 Ok(())
             };
-            frames(motion).write(&mut card, &look, wrote).unwrap();
+            frames(motion).write(&mut card, &options, wrote).unwrap();
             Dump::read(&std::fs::read(&files[0]).unwrap()).unwrap()
         };
         let again = drawn(Some(vec![yaw, pitch, roll, distance]));

@@ -1,6 +1,6 @@
 //! `dump`: frames from QEMU's card.
 
-use frames::write::Frames;
+use frames::write::DumpOptions;
 
 use crate::common::Common;
 use crate::output::print_path;
@@ -16,9 +16,9 @@ Examples:
                                                              your own model";
 
 /// Boots, and writes a dump and a PNG of each frame.
-pub fn run(mut common: Common, frames: &Frames) -> anyhow::Result<()> {
+pub fn run(mut common: Common, frames: &DumpOptions) -> anyhow::Result<()> {
     let model = common.load_to_boot()?;
     let mut machine = common.boot(model.as_ref())?;
-    frames.write(&mut machine, &common.look, print_path)?;
+    frames.write(&mut machine, &common.frame_options, print_path)?;
     machine.leave()
 }

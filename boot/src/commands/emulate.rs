@@ -1,7 +1,7 @@
 //! `emulate`: frames from the emulated VGA.
 
-use frames::card::{self, Emulated};
-use frames::write::Frames;
+use frames::backend::{self, EmulatedDemo};
+use frames::write::DumpOptions;
 use import::Model;
 
 use crate::common::Common;
@@ -17,10 +17,10 @@ Examples:
                                                                in reduced quality";
 
 /// Writes a dump and a PNG of each frame.
-pub fn run(common: &Common, frames: &Frames) -> anyhow::Result<()> {
+pub fn run(common: &Common, frames: &DumpOptions) -> anyhow::Result<()> {
     let model = common.load()?;
     let model_file = model.as_ref().map(Model::file);
-    let mut memory = card::memory();
-    let mut card = Emulated::with(&mut memory, model_file.as_ref())?;
-    frames.write(&mut card, &common.look, print_path)
+    let mut memory = backend::memory();
+    let mut card = EmulatedDemo::with(&mut memory, model_file.as_ref())?;
+    frames.write(&mut card, &common.frame_options, print_path)
 }

@@ -1,6 +1,6 @@
 //! `replay`: many frames at once.
 
-use frames::replay::Options;
+use frames::replay::ReplayOptions;
 
 use crate::output::print_path;
 
@@ -12,6 +12,6 @@ Examples:
   cargo run -- replay tests/golden --sheet goldens.png";
 
 /// Plays a folder, or makes its sheet.
-pub fn run(options: &Options) -> anyhow::Result<()> {
+pub fn run(options: &ReplayOptions) -> anyhow::Result<()> {
     options.run(print_path)
 }

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use import::Model;
-use study::trade::{self, Options};
+use study::trade::{self, TradeOptions};
 use system::say;
 
 use crate::common::Common;
@@ -19,12 +19,12 @@ Examples:
   cargo run --release -- trade --model thing.obj          your own model alone";
 
 /// Measures, and writes tables, plots and a page. A debug build gives exit code 2.
-pub fn run(common: Common, mut options: Options) -> anyhow::Result<ExitCode> {
+pub fn run(common: Common, mut options: TradeOptions) -> anyhow::Result<ExitCode> {
     if let Err(error) = trade::check_build() {
         say(format_args!("error: {error}"));
         return Ok(ExitCode::from(2));
     }
-    let (scene, mapper) = (common.look.scene, common.look.mapper);
+    let (scene, mapper) = (common.frame_options.scene, common.frame_options.mapper);
     options.scenes.extend(scene.map(|scene| scene.0.into()));
     options
         .mappers

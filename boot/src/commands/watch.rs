@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use crystal_ball::window;
-use frames::card::Card;
-use frames::look::Look;
+use frames::backend::Backend;
+use frames::options::FrameOptions;
 use protocol::{Action, Change, Command};
 use qemu::{Config, Machine};
 use system::{say, write_atomically};
@@ -22,7 +22,7 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
     common.options.window = !headless && has_display();
     let ready = setup::ready(&common.options)?;
     let config = common.config(&ready, model.as_ref());
-    let look = &common.look;
+    let frame_options = &common.frame_options;
     let displays = &ready.qemu.displays;
     // GTK's window scales the frame with its size only with this option.
     let display = [("gtk", "gtk,zoom-to-fit=on"), ("sdl", "sdl")]
@@ -38,7 +38,7 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
         };
         say(format_args!("{why}: booting without a window"));
     }
-    let name = png_name(look, config.model_file);
+    let name = png_name(frame_options, config.model_file);
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
@@ -52,15 +52,15 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
         // If the window cannot be enlarged, it stays as small as QEMU made it.
         let _ = window::enlarge(machine.process());
     }
-    for command in look.commands() {
-        machine.ask(command)?;
+    for command in frame_options.commands() {
+        machine.send(command)?;
     }
     let seconds = start.elapsed().as_secs_f64();
     say(format_args!(
         "the first frame is on the screen after {seconds:.1} s"
     ));
     if display.is_some() {
-        machine.ask(Command::Steer(None, Change::Act(Action::Hint)))?;
+        machine.send(Command::Steer(None, Change::Act(Action::Hint)))?;
         say("press H in the window to see the keys; close it or press Ctrl-C to end the run");
         return machine.watch();
     }
@@ -74,9 +74,9 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
 }
 
 /// Returns the name of a run's PNG. Two runs at once that show different things write different files.
-fn png_name(look: &Look, model_file: Option<u32>) -> String {
+fn png_name(frame_options: &FrameOptions, model_file: Option<u32>) -> String {
     let mut name = String::from("frame");
-    for command in look.commands() {
+    for command in frame_options.commands() {
         if let Command::Set(_, Some(word)) = command {
             // A tolerance is a fraction.
             name += &format!("-{word}").replace('/', "_");

@@ -20,7 +20,7 @@ use system::Step;
 
 mod accesses;
 
-pub use accesses::{Accesses, Emulated, Memories};
+pub use accesses::{Accesses, BenchMemories, EmulatedBenches};
 
 /// A CPU model of QEMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl fmt::Display for Cpu {
 
 /// The parts to measure.
 #[derive(Clone, Debug)]
-pub struct Config {
+pub struct MeasureConfig {
     /// The options of the set-up.
     pub options: Options,
     /// The CPU models. Each one needs a few minutes.
@@ -62,10 +62,10 @@ pub struct Config {
     /// The rounds of which times are the median, 1 to [`MAX_ROUNDS`].
     pub rounds: usize,
     /// Whether to measure spans of each length separately, too.
-    pub runs: bool,
+    pub spans: bool,
 }
 
-impl Default for Config {
+impl Default for MeasureConfig {
     /// Returns the configuration that measures everything, in five rounds.
     fn default() -> Self {
         Self {
@@ -73,61 +73,61 @@ impl Default for Config {
             cpus: Cpu::ALL.to_vec(),
             mappers: Mapper::ALL.iter().map(|&(_, mapper, _)| mapper).collect(),
             rounds: 5,
-            runs: true,
+            spans: true,
         }
     }
 }
 
 /// The measured figures.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct KernelFigures {
     /// QEMU's version.
     pub qemu: String,
     /// The figures for each requested CPU model.
-    pub cpus: Vec<OnCpu>,
+    pub cpus: Vec<CpuFigures>,
 }
 
 /// The figures for one CPU model.
 #[derive(Clone, Debug)]
-pub struct OnCpu {
+pub struct CpuFigures {
     /// The model.
     pub cpu: Cpu,
     /// Whether the kernel found BMI2 on the model.
     pub bmi2: bool,
     /// A row for each mapper in each of [`Order::ALL`].
-    pub rows: Vec<Row>,
+    pub rows: Vec<KernelRow>,
 }
 
-impl OnCpu {
+impl CpuFigures {
     /// Returns the row of a mapper and an order.
-    pub fn row(&self, mapper: Mapper, order: Order) -> Option<&Row> {
-        let found = |row: &&Row| row.mapper == mapper && row.order == order;
+    pub fn row(&self, mapper: Mapper, order: Order) -> Option<&KernelRow> {
+        let found = |row: &&KernelRow| row.mapper == mapper && row.order == order;
         self.rows.iter().find(found)
     }
 }
 
 /// The costs of a mapper in an order.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct KernelRow {
     /// The mapper.
     pub mapper: Mapper,
     /// The order.
     pub order: Order,
     /// The cost of each piece of work. The references ([`Work::BareRam`], [`Work::BareCard`],
     /// [`Work::Present`]) ran in the same rounds as the other work.
-    pub works: BTreeMap<Work, Cost>,
-    /// The costs of spans of one length, drawn in RAM; empty unless [`Config::runs`] was set.
-    pub runs: Vec<RunCost>,
+    pub works: BTreeMap<Work, WorkCost>,
+    /// The costs of spans of one length, drawn in RAM; empty unless [`MeasureConfig::spans`] was set.
+    pub spans: Vec<SpanCost>,
     /// The accesses of one frame of the ball to the emulated VGA.
     pub accesses: Accesses,
 }
 
-impl Row {
+impl KernelRow {
     /// Returns the cost of a piece of work.
     ///
     /// # Panics
     /// Never: a row has all of [`Work::ALL`].
-    pub fn cost(&self, work: Work) -> &Cost {
+    pub fn cost(&self, work: Work) -> &WorkCost {
         &self.works[&work]
     }
 
@@ -143,17 +143,17 @@ impl Row {
     }
 
     /// Returns the time of a whole frame of the ball, relative to bare byte stores of as many pixels.
-    pub fn frame_over_bare(&self) -> Spread {
+    pub fn frame_over_bare(&self) -> TimeRatio {
         self.ratio(self.whole_frame(), Work::BareCard)
     }
 
     /// Returns the time of a whole frame of the ball, relative to presenting the same bytes already drawn.
-    pub fn frame_over_present(&self) -> Spread {
+    pub fn frame_over_present(&self) -> TimeRatio {
         self.ratio(self.whole_frame(), Work::Present)
     }
 
     /// Returns the time a pixel of `work`, relative to that of `over`, round by round.
-    pub fn ratio(&self, work: Work, over: Work) -> Spread {
+    pub fn ratio(&self, work: Work, over: Work) -> TimeRatio {
         self.cost(work).over(self.cost(over))
     }
 }
@@ -168,7 +168,7 @@ fn whole_frame(order: Order) -> Work {
 
 /// The cost of a piece of work.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Cost {
+pub struct WorkCost {
     /// The pixels that it draws.
     pub pixels: u64,
     /// The instructions, exact.
@@ -178,14 +178,14 @@ pub struct Cost {
     pub ticks: Vec<u64>,
 }
 
-impl Cost {
+impl WorkCost {
     /// Returns the instructions a pixel.
     pub fn instructions_a_pixel(&self) -> f64 {
         self.instructions as f64 / self.pixels as f64
     }
 
     /// Returns the time a pixel, relative to the other cost's, round by round.
-    pub fn over(&self, other: &Self) -> Spread {
+    pub fn over(&self, other: &Self) -> TimeRatio {
         let a_pixel = |cost: &Self, ticks: u64| ticks as f64 / cost.pixels as f64;
         let rounds = self.ticks.iter().zip(&other.ticks);
         let mut ratios: Vec<f64> = rounds
@@ -194,7 +194,7 @@ impl Cost {
         let least = |cost: &Self| cost.ticks.iter().copied().min().unwrap_or(0);
         let undisturbed = a_pixel(self, least(self)) / a_pixel(other, least(other));
         ratios.sort_by(f64::total_cmp);
-        Spread {
+        TimeRatio {
             median: ratios[ratios.len() / 2],
             least: ratios[0],
             most: ratios[ratios.len() - 1],
@@ -205,7 +205,7 @@ impl Cost {
 
 /// A ratio of times.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
+pub struct TimeRatio {
     /// The median of the rounds' ratios.
     pub median: f64,
     /// The smallest of the rounds' ratios.
@@ -217,7 +217,7 @@ pub struct Spread {
     pub undisturbed: f64,
 }
 
-impl fmt::Display for Spread {
+impl fmt::Display for TimeRatio {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             median,
@@ -234,13 +234,13 @@ impl fmt::Display for Spread {
 
 /// The costs of spans of one length.
 #[derive(Clone, Debug)]
-pub struct RunCost {
+pub struct SpanCost {
     /// The pixels of each span.
     pub length: u16,
     /// The cost of making the jobs of a face with such spans.
-    pub jobs: Cost,
+    pub jobs: WorkCost,
     /// The cost of drawing the jobs in RAM.
-    pub draw: Cost,
+    pub draw: WorkCost,
 }
 
 /// Builds the benchmark kernel if necessary, boots it, and measures the parts that `config` names.
@@ -248,14 +248,14 @@ pub struct RunCost {
 /// # Errors
 /// As [`setup::ready`]; a [`qemu::Failure`]; counts that do not repeat under `-icount`; and frames that
 /// differ from the emulated VGA's.
-pub fn run(config: &Config) -> anyhow::Result<Measured> {
+pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
     ensure!(
         (1..=MAX_ROUNDS).contains(&config.rounds),
         "rounds are 1 to {MAX_ROUNDS}"
     );
     let ready = setup::ready_to_measure(&config.options)?;
-    let mut memories = Memories::default();
-    let mut emulated = Emulated::new(&mut memories);
+    let mut memories = BenchMemories::default();
+    let mut emulated = EmulatedBenches::new(&mut memories);
     let all = config.cpus.len() * config.mappers.len() * Order::ALL.len() * 2;
     let mut step = Step::counting("measuring in QEMU", all as u64);
     let mut done = 0..;
@@ -266,7 +266,7 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
         let a_tick = counting.ticks_an_instruction()?;
         let mut counted = Vec::new();
         for (mapper, order) in asked(config) {
-            counted.push(counting.measure(mapper, order, 2, config.runs)?);
+            counted.push(counting.measure(mapper, order, 2, config.spans)?);
             tick();
         }
         counting.machine.leave()?;
@@ -274,28 +274,28 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
         let mut rows = Vec::new();
         for ((mapper, order), counted) in asked(config).zip(counted) {
             emulated.compare(mapper, order, &timing.ask(Ask::Check(mapper, order))?)?;
-            let timed = timing.measure(mapper, order, config.rounds, config.runs)?;
+            let timed = timing.measure(mapper, order, config.rounds, config.spans)?;
             tick();
-            rows.push(Row {
+            rows.push(KernelRow {
                 mapper,
                 order,
                 works: counted.costs(&timed, a_tick)?,
-                runs: counted.run_costs(&timed, a_tick)?,
+                spans: counted.span_costs(&timed, a_tick)?,
                 accesses: emulated.accesses(mapper, order)?,
             });
         }
         let bmi2 = timing.has_bmi2()?;
         timing.machine.leave()?;
-        cpus.push(OnCpu { cpu, bmi2, rows });
+        cpus.push(CpuFigures { cpu, bmi2, rows });
     }
-    Ok(Measured {
+    Ok(KernelFigures {
         qemu: ready.qemu.version.clone(),
         cpus,
     })
 }
 
 /// Returns the mappers and orders to measure.
-fn asked(config: &Config) -> impl Iterator<Item = (Mapper, Order)> {
+fn asked(config: &MeasureConfig) -> impl Iterator<Item = (Mapper, Order)> {
     let mappers = config.mappers.iter();
     mappers.flat_map(|&mapper| Order::ALL.map(|(_, order, _)| (mapper, order)))
 }
@@ -365,13 +365,13 @@ impl Guest {
         mapper: Mapper,
         order: Order,
         rounds: usize,
-        runs: bool,
-    ) -> anyhow::Result<Told> {
+        spans: bool,
+    ) -> anyhow::Result<Reported> {
         let mut figures = self.figures(Ask::Measure(mapper, order, rounds))?;
-        if runs {
+        if spans {
             figures.append(&mut self.figures(Ask::Runs(mapper, order, rounds))?);
         }
-        Ok(Told { figures })
+        Ok(Reported { figures })
     }
 
     /// Requests figures, and returns them by name.
@@ -390,24 +390,24 @@ impl Guest {
 }
 
 /// The figures of one machine for a mapper and an order.
-struct Told {
+struct Reported {
     figures: BTreeMap<String, Figure>,
 }
 
-impl Told {
+impl Reported {
     /// Returns the costs of all work, with the instructions of `self` and the times of `timed`.
-    fn costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<BTreeMap<Work, Cost>> {
+    fn costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<BTreeMap<Work, WorkCost>> {
         let all = Work::ALL.iter();
         all.map(|&(name, work)| Ok((work, self.cost(name, timed, a_tick)?)))
             .collect()
     }
 
-    fn run_costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<Vec<RunCost>> {
+    fn span_costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<Vec<SpanCost>> {
         let name = |length| format!("run-{length}-jobs");
         let lengths = LENGTHS.into_iter();
         let told = lengths.filter(|&length| self.figures.contains_key(&name(length)));
         told.map(|length| {
-            Ok(RunCost {
+            Ok(SpanCost {
                 length,
                 jobs: self.cost(&name(length), timed, a_tick)?,
                 draw: self.cost(&format!("run-{length}-draw"), timed, a_tick)?,
@@ -416,7 +416,7 @@ impl Told {
         .collect()
     }
 
-    fn cost(&self, name: &str, timed: &Self, a_tick: u64) -> anyhow::Result<Cost> {
+    fn cost(&self, name: &str, timed: &Self, a_tick: u64) -> anyhow::Result<WorkCost> {
         let figure = |told: &Self| {
             let figure = told.figures.get(name).copied();
             figure.with_context(|| format!("the measuring kernel told nothing of '{name}'"))
@@ -428,7 +428,7 @@ impl Told {
             counted.pixels(),
             timed.pixels()
         );
-        Ok(Cost {
+        Ok(WorkCost {
             pixels: counted.pixels(),
             instructions: repeated(name, &counted, a_tick)?,
             ticks: timed.ticks().to_vec(),
@@ -457,22 +457,22 @@ mod tests {
         figure
     }
 
-    fn told(name: &str, figure: Figure) -> Told {
-        Told {
+    fn told(name: &str, figure: Figure) -> Reported {
+        Reported {
             figures: BTreeMap::from([(name.to_string(), figure)]),
         }
     }
 
     #[test]
     fn ratios_are_of_the_same_round_and_a_pixel_each() {
-        let cost = |pixels, ticks: &[u64]| Cost {
+        let cost = |pixels, ticks: &[u64]| WorkCost {
             pixels,
             instructions: 0,
             ticks: ticks.to_vec(),
         };
         // A disturbance lengthened the second round of both, and the third round of the reference alone.
         let ratio = cost(10, &[20, 200, 22]).over(&cost(5, &[20, 100, 40]));
-        let expected = Spread {
+        let expected = TimeRatio {
             median: 0.5,
             least: 0.275,
             most: 1.0,

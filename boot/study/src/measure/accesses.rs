@@ -25,12 +25,12 @@ pub struct Accesses {
 
 /// The memory that the benches on the emulated VGAs borrow.
 #[derive(Debug)]
-pub struct Memories {
+pub struct BenchMemories {
     counted: InPlace<Memory>,
     plain: InPlace<Memory>,
 }
 
-impl Default for Memories {
+impl Default for BenchMemories {
     fn default() -> Self {
         let counted = in_place::boxed!(Memory);
         let plain = counted.clone();
@@ -40,7 +40,7 @@ impl Default for Memories {
 
 /// Two benches with the benchmark kernel's work on emulated VGAs: with counters and without.
 #[derive(Debug)]
-pub struct Emulated<'a> {
+pub struct EmulatedBenches<'a> {
     counted: Bench<'a, Counted<Vga>>,
     plain: Bench<'a, Vga>,
 }
@@ -52,9 +52,9 @@ const NO_CLOCK: Clock = Clock {
     bmi2: false,
 };
 
-impl<'a> Emulated<'a> {
+impl<'a> EmulatedBenches<'a> {
     /// Returns benches whose emulated VGAs are in the state after the mode set.
-    pub fn new(memories: &'a mut Memories) -> Self {
+    pub fn new(memories: &'a mut BenchMemories) -> Self {
         let taken = "the emulated card takes Mode X";
         let counted = Counted::new(Vga::new());
         Self {

@@ -4,13 +4,13 @@ use std::fmt::Display;
 
 use texmap::{Mapper, Order};
 
-use super::cost::{ANGLE, LENGTH, Swept};
+use super::cost::{ANGLE, LENGTH, SweepPoint};
 use super::table::Table;
-use crate::measure::{Cpu, Measured, Row, Spread};
+use crate::measure::{Cpu, KernelFigures, KernelRow, TimeRatio};
 
 /// Returns the kernel's table: a row for each mapper in each order, with the figures of the baseline CPU
 /// model, and the instructions of the other model.
-pub fn cells(measured: &Measured) -> Vec<Vec<String>> {
+pub fn cells(measured: &KernelFigures) -> Vec<Vec<String>> {
     let head = [
         "mapper",
         "order",
@@ -51,8 +51,8 @@ pub fn cells(measured: &Measured) -> Vec<Vec<String>> {
     cells
 }
 
-fn spread(ratio: Spread) -> String {
-    let Spread {
+fn spread(ratio: TimeRatio) -> String {
+    let TimeRatio {
         median,
         least,
         most,
@@ -61,22 +61,23 @@ fn spread(ratio: Spread) -> String {
     format!("{median:.2} ({least:.2} to {most:.2})")
 }
 
-fn of(measured: &Measured, cpu: Cpu) -> &[Row] {
+fn of(measured: &KernelFigures, cpu: Cpu) -> &[KernelRow] {
     let on = measured.cpus.iter().find(|on| on.cpu == cpu);
     on.map_or(&[], |on| &on.rows)
 }
 
-/// A figure of the run, if everything that it needs was measured.
-type Figure = Option<f64>;
-
 /// Returns the targets, the measured values, and whether each target is met.
-pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -> Vec<Vec<String>> {
+pub fn targets(
+    tables: &[Table],
+    sweep: &[SweepPoint],
+    measured: Option<&KernelFigures>,
+) -> Vec<Vec<String>> {
     let mut cells = vec![
         ["what", "aimed at", "measured", ""]
             .map(String::from)
             .to_vec(),
     ];
-    let mut add = |what: &str, aimed: f64, most: bool, figure: Figure| {
+    let mut add = |what: &str, aimed: f64, most: bool, figure: Option<f64>| {
         let bound = if most { "at most" } else { "at least" };
         let said = figure.map_or("not measured".into(), |figure| format!("{figure:.2}"));
         let met = match figure.map(|figure| {
@@ -93,15 +94,15 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
         let aimed = format!("{bound} {aimed}");
         cells.push(vec![what.into(), aimed, said, met.into()]);
     };
-    let host = Host { tables, swept };
+    let host = Host { tables, sweep };
     add(
         "best affine column loop by planes, over a bare load and store",
         1.15,
         true,
         host.best(Order::Planes)
-            .map(|swept| swept.cost.to_bare.median),
+            .map(|point| point.cost.to_bare.median),
     );
-    let best = host.best(Order::Planes).map(|swept| swept.cost.time.median);
+    let best = host.best(Order::Planes).map(|point| point.cost.time.median);
     add(
         "`packed` by polygons over the best by planes",
         2.5,
@@ -115,11 +116,11 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
         over(host.time("row-multiply", Order::Polygons), best),
     );
     // Polygon by polygon, because plane by plane the mappers of rows do not draw rows as their names say.
-    let screen = |cpu, mapper: fn(Mapper) -> bool| -> Figure {
+    let screen = |cpu, mapper: fn(Mapper) -> bool| -> Option<f64> {
         let rows = of(measured?, cpu).iter();
         let figures = rows
             .filter(|row| mapper(row.mapper) && row.order == Order::Polygons)
-            .map(Row::instructions_a_pixel);
+            .map(KernelRow::instructions_a_pixel);
         figures.min_by(f64::total_cmp)
     };
     let affine = |mapper| matches!(mapper, Mapper::Affine(_));
@@ -158,14 +159,14 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
             host.frame("grazing-16", "within-1/2"),
         ),
     );
-    let masks = |order| -> Figure {
+    let masks = |order| -> Option<f64> {
         let rows = of(measured?, Cpu::Baseline).iter();
         let mut rows = rows.filter(|row| row.mapper == Mapper::default() && row.order == order);
         Some(rows.next()?.accesses.draw.map_mask as f64)
     };
     let what = "Map Mask writes of a frame of the ball by planes, drawing";
     add(what, 4.0, true, masks(Order::Planes));
-    let frame = |ratio: fn(&Row) -> f64| -> Figure {
+    let frame = |ratio: fn(&KernelRow) -> f64| -> Option<f64> {
         let rows = of(measured?, Cpu::Baseline).iter().map(ratio);
         rows.min_by(f64::total_cmp)
     };
@@ -184,43 +185,43 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
     cells
 }
 
-fn over(a: Figure, b: Figure) -> Figure {
+fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     Some(a? / b?)
 }
 
 /// The measurements in RAM.
 struct Host<'a> {
     tables: &'a [Table],
-    swept: &'a [Swept],
+    sweep: &'a [SweepPoint],
 }
 
 impl Host<'_> {
     /// Returns the measurements of an order on long spans.
-    fn long(&self, order: Order) -> impl Iterator<Item = &Swept> {
-        let of = move |swept: &&Swept| {
-            swept.length == LENGTH && swept.angle == ANGLE && swept.order == order
+    fn long(&self, order: Order) -> impl Iterator<Item = &SweepPoint> {
+        let of = move |point: &&SweepPoint| {
+            point.length == LENGTH && point.angle == ANGLE && point.order == order
         };
-        self.swept.iter().filter(of)
+        self.sweep.iter().filter(of)
     }
 
     /// Returns the affine column loop that is fastest on long spans.
-    fn best(&self, order: Order) -> Option<&Swept> {
+    fn best(&self, order: Order) -> Option<&SweepPoint> {
         let affine = self
             .long(order)
-            .filter(|swept| matches!(swept.mapper, Mapper::Affine(_)));
+            .filter(|point| matches!(point.mapper, Mapper::Affine(_)));
         affine.min_by(|a, b| a.cost.time.median.total_cmp(&b.cost.time.median))
     }
 
     /// Returns a mapper's time on long spans.
-    fn time(&self, mapper: &str, order: Order) -> Figure {
-        let swept = self
+    fn time(&self, mapper: &str, order: Order) -> Option<f64> {
+        let point = self
             .long(order)
-            .find(|swept| swept.mapper.to_string() == mapper);
-        swept.map(|swept| swept.cost.time.median)
+            .find(|point| point.mapper.to_string() == mapper);
+        point.map(|point| point.cost.time.median)
     }
 
     /// Returns the time of a scene's frame, in the cheaper of the orders.
-    fn frame(&self, scene: &str, mapper: impl Display) -> Figure {
+    fn frame(&self, scene: &str, mapper: impl Display) -> Option<f64> {
         let table = self.tables.iter().find(|table| table.scene == scene)?;
         let row = table
             .rows

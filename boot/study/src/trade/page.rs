@@ -5,11 +5,11 @@ use std::fmt::Write as _;
 use modex::{HEIGHT, WIDTH};
 use texmap::Mapper;
 
-use super::accuracy::{self, Accuracy, Jobs};
-use super::subject::Subject;
+use super::accuracy::{self, Accuracy, FrameJobs};
 use super::table::{decibels, percent, texels};
-use frames::indexed::Indexed;
-use frames::screen::Screen;
+use super::workload::Workload;
+use frames::indexed::IndexedImage;
+use frames::rgb::RgbImage;
 
 /// The page's addition to the style sheet of the reports.
 const STYLE: &str = include_str!("page.css");
@@ -30,13 +30,13 @@ const NOTHING: [u8; 3] = [0x4C, 0x4C, 0x4C];
 
 /// A frame and the map of its errors, shared by all mappers that draw both alike.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct GalleryFrame {
     /// The mappers' names.
     pub mappers: Vec<String>,
     /// The frame.
-    pub image: Indexed,
+    pub image: IndexedImage,
     /// The map of the frame's errors.
-    pub heat: Screen,
+    pub heat: RgbImage,
     /// The mappers' accuracy on the frame.
     pub accuracy: Accuracy,
 }
@@ -49,48 +49,49 @@ pub struct Gallery {
     /// A line about the scene.
     pub about: String,
     /// The frames that differ.
-    pub shown: Vec<Shown>,
+    pub shown: Vec<GalleryFrame>,
 }
 
 impl Gallery {
-    /// Draws a subject's first frame with each mapper.
-    pub fn new(subject: &Subject<'_>, mappers: &[Mapper], jobs: &mut Jobs) -> Self {
-        let mut shown: Vec<Shown> = Vec::new();
+    /// Draws a workload's first frame with each mapper.
+    pub fn new(workload: &Workload<'_>, mappers: &[Mapper], jobs: &mut FrameJobs) -> Self {
+        let mut shown: Vec<GalleryFrame> = Vec::new();
         let colours = |pixels: &[u8]| {
-            let colours = pixels.iter().map(|&i| subject.palette[usize::from(i)]);
+            let colours = pixels.iter().map(|&i| workload.palette[usize::from(i)]);
             colours.collect::<Vec<_>>()
         };
-        let exact = colours(&accuracy::frame(subject, 0, Mapper::Exact, jobs));
+        let exact = colours(&accuracy::frame(workload, 0, Mapper::Exact, jobs));
         for &mapper in mappers {
-            let pixels = accuracy::frame(subject, 0, mapper, jobs);
+            let pixels = accuracy::frame(workload, 0, mapper, jobs);
             let mut accuracy = Accuracy {
                 psnr: super::stats::psnr(&colours(&pixels), &exact),
                 ..Accuracy::default()
             };
             let mut heat = vec![NOTHING; WIDTH * HEIGHT];
-            for face in &subject.frames[0] {
-                let texture = subject.texture(face.face().texture);
+            for face in &workload.frames[0] {
+                let texture = workload.texture(face.face().texture);
                 accuracy::errors(mapper, face, texture, |(x, y), error, other| {
                     heat[usize::from(y) * WIDTH + usize::from(x)] = colour(error);
                     accuracy.errors.add(error);
                     accuracy.other_texels += u64::from(other);
                 });
             }
-            let alike =
-                |s: &&mut Shown| s.image.pixels == pixels && s.accuracy.errors == accuracy.errors;
+            let alike = |s: &&mut GalleryFrame| {
+                s.image.pixels == pixels && s.accuracy.errors == accuracy.errors
+            };
             if let Some(same) = shown.iter_mut().find(alike) {
                 same.mappers.push(mapper.to_string());
                 continue;
             }
-            shown.push(Shown {
+            shown.push(GalleryFrame {
                 mappers: vec![mapper.to_string()],
-                image: Indexed {
+                image: IndexedImage {
                     width: WIDTH,
                     height: HEIGHT,
-                    palette: subject.palette.map(|c| c.map(|part| part >> 2)).to_vec(),
+                    palette: workload.palette.map(|c| c.map(|part| part >> 2)).to_vec(),
                     pixels,
                 },
-                heat: Screen {
+                heat: RgbImage {
                     width: WIDTH,
                     height: HEIGHT,
                     pixels: heat,
@@ -99,14 +100,14 @@ impl Gallery {
             });
         }
         Self {
-            scene: subject.name.into(),
-            about: subject.about.clone(),
+            scene: workload.name.into(),
+            about: workload.about.clone(),
             shown,
         }
     }
 
     /// Returns the file name of a frame, or of its map.
-    pub fn file(&self, shown: &Shown, map: bool) -> String {
+    pub fn file(&self, shown: &GalleryFrame, map: bool) -> String {
         let of = if map { "-error" } else { "" };
         // A mapper's name can have a slash.
         let mapper = shown.mappers[0].replace(|c: char| !c.is_ascii_alphanumeric(), "-");
@@ -157,7 +158,7 @@ fn colour(error: f64) -> [u8; 3] {
 
 /// The parts of the page.
 #[derive(Debug)]
-pub struct Page<'a> {
+pub struct TradePage<'a> {
     /// Lines about the run and about the machine.
     pub about: &'a [String],
     /// The plots, each with a caption and the SVG.
@@ -169,10 +170,10 @@ pub struct Page<'a> {
     /// The tables, each with a title, a line about it, and the cells. The first table is shown open.
     pub tables: &'a [(String, String, Vec<Vec<String>>)],
     /// The cells of the table of the sources' claims.
-    pub trials: &'a [Vec<String>],
+    pub claims: &'a [Vec<String>],
 }
 
-impl Page<'_> {
+impl TradePage<'_> {
     /// Returns the page as HTML.
     pub fn html(&self) -> String {
         let mut page = format!(
@@ -224,10 +225,10 @@ impl Page<'_> {
         for gallery in self.galleries {
             gallery.section(&mut page, self.folder);
         }
-        page += "<section class=\"card trials\">\n<h2>The seeds on trial</h2>\n<p>What the book's \
+        page += "<section class=\"card claims\">\n<h2>The sources' claims, measured</h2>\n<p>What the book's \
                  chapters 57 and 58 and the articles on perspective claim, of the machines of their \
                  day, and what it comes to here.</p>\n";
-        table(&mut page, self.trials);
+        table(&mut page, self.claims);
         page += "</section>\n</main>\n</body>\n</html>\n";
         page
     }
@@ -279,7 +280,7 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trade::subject::with;
+    use crate::trade::workload::with;
 
     #[test]
     fn colours_go_from_small_to_large_errors_and_the_legend_has_them() {
@@ -298,9 +299,9 @@ mod tests {
     #[test]
     fn the_page_names_every_file_and_fetches_nothing() {
         let mappers = ["affine", "packed", "exact"].map(|name| Mapper::parse(name).unwrap());
-        let mut jobs = Box::new(Jobs::new());
-        let gallery = with("tilted", 0, |subject| {
-            Gallery::new(subject, &mappers, &mut jobs)
+        let mut jobs = Box::new(FrameJobs::new());
+        let gallery = with("tilted", 0, |workload| {
+            Gallery::new(workload, &mappers, &mut jobs)
         });
         let names = gallery.shown.iter().map(|shown| shown.mappers.len());
         assert_eq!(names.sum::<usize>(), 3);
@@ -311,7 +312,7 @@ mod tests {
             .unwrap();
         assert_eq!(exact.accuracy.psnr, f64::INFINITY);
         assert!(exact.heat.pixels.contains(&COLOURS[0]) && exact.heat.pixels.contains(&NOTHING));
-        let html = Page {
+        let html = TradePage {
             about: &["a <b>".into()],
             plots: &[("caption".into(), "<svg></svg>".into())],
             galleries: std::slice::from_ref(&gallery),
@@ -321,7 +322,7 @@ mod tests {
                 "about".into(),
                 vec![vec!["h".into()], vec!["`c` < d".into()]],
             )],
-            trials: &[vec!["head".into()]],
+            claims: &[vec!["head".into()]],
         }
         .html();
         for shown in &gallery.shown {

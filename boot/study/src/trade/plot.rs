@@ -48,7 +48,7 @@ fn family(mapper: Mapper) -> usize {
 
 /// A mapper in the plot of error against cost.
 #[derive(Clone, Debug)]
-pub struct Point {
+pub struct PlotPoint {
     /// The mapper.
     pub mapper: Mapper,
     /// The mapper's cost, above zero.
@@ -61,7 +61,7 @@ pub struct Point {
 
 /// A named line in a plot.
 #[derive(Clone, Debug)]
-pub struct Line {
+pub struct PlotLine {
     /// The line's name.
     pub name: String,
     /// The points: the pixel and the error in texels, or the span length and the cost.
@@ -70,7 +70,7 @@ pub struct Line {
 
 /// An axis with a logarithmic or a linear scale.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+struct PlotAxis {
     from: f64,
     to: f64,
     log: bool,
@@ -78,7 +78,7 @@ struct Axis {
     pixels: (i32, i32),
 }
 
-impl Axis {
+impl PlotAxis {
     /// Returns an axis that contains some values. A logarithmic axis has some room on both sides of them.
     fn around(values: impl Iterator<Item = f64>, log: bool, pixels: (i32, i32)) -> Self {
         let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -186,7 +186,7 @@ fn write(
 fn frame(
     area: &Area<'_>,
     title: [&str; 2],
-    axes: (&Axis, &Axis),
+    axes: (&PlotAxis, &PlotAxis),
     names: [&str; 2],
 ) -> anyhow::Result<()> {
     area.fill(&WHITE).map_err(failed)?;
@@ -310,17 +310,17 @@ fn place_names(
 pub fn error_against_cost(
     title: [&str; 2],
     names: [&str; 2],
-    points: &[Point],
+    points: &[PlotPoint],
 ) -> anyhow::Result<String> {
     let (left, right) = (MARGINS[0], WIDTH - MARGINS[1]);
     let (top, bottom) = (MARGINS[2], HEIGHT - MARGINS[3]);
     // The last bit of a coordinate: smaller errors cannot be distinguished.
-    let error = |point: &Point| point.error.max(1.0 / 65_536.0);
-    let x = Axis::around(points.iter().map(|p| p.cost), true, (left, right));
-    let mut y = Axis::around(points.iter().map(error), true, (bottom, top));
+    let error = |point: &PlotPoint| point.error.max(1.0 / 65_536.0);
+    let x = PlotAxis::around(points.iter().map(|p| p.cost), true, (left, right));
+    let mut y = PlotAxis::around(points.iter().map(error), true, (bottom, top));
     // Room for names above the mappers with the largest errors, which are many, with similar errors.
     y.to *= (y.to / y.from).powf(0.06);
-    let at = |point: &Point| (x.place(point.cost), y.place(error(point)));
+    let at = |point: &PlotPoint| (x.place(point.cost), y.place(error(point)));
     let mut svg = String::new();
     {
         let area =
@@ -382,7 +382,7 @@ pub fn error_against_cost(
 }
 
 /// Draws the legend: the families in the plot, the two marks, and the front.
-fn legend(area: &Area<'_>, points: &[Point]) -> anyhow::Result<()> {
+fn legend(area: &Area<'_>, points: &[PlotPoint]) -> anyhow::Result<()> {
     let (mut x, y) = (MARGINS[0], 74);
     for (i, (name, colour)) in FAMILIES.iter().enumerate() {
         if points.iter().any(|point| family(point.mapper) == i) {
@@ -430,14 +430,14 @@ pub fn lines(
     names: [&str; 2],
     least: f64,
     log_x: bool,
-    lines: &[Line],
+    lines: &[PlotLine],
 ) -> anyhow::Result<String> {
     let room = 118;
     let (left, right) = (MARGINS[0], WIDTH - MARGINS[1] - room);
     let (top, bottom) = (MARGINS[2] - 14, HEIGHT - MARGINS[3]);
     let all = || lines.iter().flat_map(|line| &line.at);
-    let x = Axis::around(all().map(|at| at.0), log_x, (left, right));
-    let y = Axis::around(all().map(|at| at.1.max(least)), true, (bottom, top));
+    let x = PlotAxis::around(all().map(|at| at.0), log_x, (left, right));
+    let y = PlotAxis::around(all().map(|at| at.1.max(least)), true, (bottom, top));
     let mut svg = String::new();
     {
         let area =
@@ -480,8 +480,8 @@ pub fn lines(
 mod tests {
     use super::*;
 
-    fn point(mapper: Mapper, cost: f64, error: f64) -> Point {
-        Point {
+    fn point(mapper: Mapper, cost: f64, error: f64) -> PlotPoint {
+        PlotPoint {
             mapper,
             cost,
             error,
@@ -522,7 +522,7 @@ mod tests {
             (1e-5, 300.0, true),
             (0.0, 239.0, false),
         ] {
-            let axis = Axis {
+            let axis = PlotAxis {
                 from,
                 to,
                 log,
@@ -562,7 +562,7 @@ mod tests {
 
     #[test]
     fn lines_are_drawn_and_named() {
-        let line = |name: &str, scale: f64| Line {
+        let line = |name: &str, scale: f64| PlotLine {
             name: name.into(),
             at: (0..50)
                 .map(|i| (f64::from(i), scale * f64::from(i)))

@@ -16,8 +16,8 @@ use scene::catalogue::Entry;
 use vga::Vga;
 
 use crate::dump::Dump;
-use crate::look::Look;
-use crate::screen::Screen;
+use crate::options::FrameOptions;
+use crate::rgb::RgbImage;
 use vga::widen;
 
 /// Returns empty memory for the demo. It is built in place, because its size of about 4 MiB exceeds a
@@ -27,44 +27,44 @@ pub fn memory() -> InPlace<Memory> {
 }
 
 /// A VGA with the demo running on it.
-pub trait Card {
+pub trait Backend {
     /// Carries out a command and returns the lines of its answer without the closing `ok`.
     ///
     /// # Errors
     /// The program's `error` line, or the reason why no answer came.
-    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>>;
+    fn send(&mut self, command: Command) -> anyhow::Result<Vec<String>>;
 
     /// Returns the contents of video memory, with the palette.
     ///
     /// # Errors
-    /// As [`Card::ask`], and an answer that is not a valid dump.
+    /// As [`Backend::ask`], and an answer that is not a valid dump.
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump>;
 
     /// Returns the image that the monitor shows.
     ///
     /// # Errors
     /// The reason why no image can be captured.
-    fn screen(&mut self) -> anyhow::Result<Screen>;
+    fn screen(&mut self) -> anyhow::Result<RgbImage>;
 
     /// Holds and resets the demo, and shows `frames` one after the other with the default options.
     ///
     /// # Errors
-    /// As [`Card::ask`].
+    /// As [`Backend::ask`].
     fn show(&mut self, frames: &[FrameName]) -> anyhow::Result<()> {
-        self.show_as(&Look::default(), frames)
+        self.show_with(&FrameOptions::default(), frames)
     }
 
-    /// Does the same as [`Card::show`], with the options in `look`.
+    /// Does the same as [`Backend::show`], with the options in `options`.
     ///
     /// # Errors
-    /// As [`Card::ask`].
-    fn show_as(&mut self, look: &Look, frames: &[FrameName]) -> anyhow::Result<()> {
-        self.ask(Command::Hold)?;
-        for command in look.commands() {
-            self.ask(command)?;
+    /// As [`Backend::ask`].
+    fn show_with(&mut self, options: &FrameOptions, frames: &[FrameName]) -> anyhow::Result<()> {
+        self.send(Command::Hold)?;
+        for command in options.commands() {
+            self.send(command)?;
         }
         for &frame in frames {
-            self.ask(Command::Show(frame))?;
+            self.send(Command::Show(frame))?;
         }
         Ok(())
     }
@@ -72,13 +72,13 @@ pub trait Card {
 
 /// The demo on the emulated VGA.
 #[derive(Debug)]
-pub struct Emulated<'a> {
+pub struct EmulatedDemo<'a> {
     show: Show<'a, Vga>,
     /// The checksum of the model file, if one is loaded.
     model_file: Option<u32>,
 }
 
-impl<'a> Emulated<'a> {
+impl<'a> EmulatedDemo<'a> {
     /// Returns the demo, held, on an emulated VGA that was just switched on.
     ///
     /// # Errors
@@ -87,10 +87,10 @@ impl<'a> Emulated<'a> {
         Self::with(memory, None)
     }
 
-    /// Returns the same as [`Emulated::new`], with the model in `model_file` as the default scene.
+    /// Returns the same as [`EmulatedDemo::new`], with the model in `model_file` as the default scene.
     ///
     /// # Errors
-    /// As [`Emulated::new`].
+    /// As [`EmulatedDemo::new`].
     pub fn with(
         memory: &'a mut Memory,
         model_file: Option<&ModelFile<'a>>,
@@ -99,7 +99,7 @@ impl<'a> Emulated<'a> {
             show: Show::new(memory, Vga::new(), model_file)?,
             model_file: model_file.map(ModelFile::checksum),
         };
-        this.ask(Command::Hold)?;
+        this.send(Command::Hold)?;
         Ok(this)
     }
 
@@ -109,8 +109,8 @@ impl<'a> Emulated<'a> {
     }
 }
 
-impl Card for Emulated<'_> {
-    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
+impl Backend for EmulatedDemo<'_> {
+    fn send(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
         let mut answer = Vec::new();
         let request = self
             .show
@@ -135,7 +135,7 @@ impl Card for Emulated<'_> {
 
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
         // The program is asked only for the header's contents: which frame this is, and how it was drawn.
-        let state = self.ask(Command::State)?;
+        let state = self.send(Command::State)?;
         let said = |what| {
             let mut lines = state.iter();
             let said = lines.find_map(|line| line.strip_prefix(what)?.strip_prefix(' '));
@@ -176,11 +176,11 @@ impl Card for Emulated<'_> {
         })
     }
 
-    fn screen(&mut self) -> anyhow::Result<Screen> {
+    fn screen(&mut self) -> anyhow::Result<RgbImage> {
         let vga = self.show.bus();
         let frame = vga.scan_out().map_err(|fault| anyhow!("{fault}"))?;
         let wide = |colour: [u8; 3]| colour.map(widen);
-        Ok(Screen {
+        Ok(RgbImage {
             width: frame.width,
             height: frame.height,
             pixels: frame.dots.into_iter().map(wide).collect(),
@@ -196,16 +196,16 @@ mod tests {
     #[test]
     fn what_the_program_reads_back_is_what_the_card_holds() {
         let mut memory = memory();
-        let mut card = Emulated::new(&mut memory).unwrap();
+        let mut card = EmulatedDemo::new(&mut memory).unwrap();
         for frames in [&[][..], &[FrameName::Number(0)], &[FrameName::Number(7); 3]] {
             card.show(frames).unwrap();
             for content in [Content::Page, Content::Memory] {
                 let seen = card.dump(content).unwrap();
-                let told = card.ask(Command::Dump(content)).unwrap();
+                let told = card.send(Command::Dump(content)).unwrap();
                 assert_eq!(told, seen.lines());
                 assert_eq!(Dump::from_lines(&told).unwrap(), seen);
                 assert_eq!(
-                    card.ask(Command::Checksums(content)).unwrap(),
+                    card.send(Command::Checksums(content)).unwrap(),
                     seen.checksums()
                 );
             }
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn a_refused_command_says_why() {
         let mut memory = memory();
-        let mut card = Emulated::new(&mut memory).unwrap();
+        let mut card = EmulatedDemo::new(&mut memory).unwrap();
         let far = FrameName::Pose {
             yaw: 0,
             pitch: 0,
@@ -227,6 +227,6 @@ mod tests {
             error.ends_with("is refused: a distance is 0 to 00800000"),
             "{error}"
         );
-        assert!(card.ask(Command::Leave).is_err());
+        assert!(card.send(Command::Leave).is_err());
     }
 }

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 
 /// The image that the monitor shows: 8 bits each of red, green and blue, row by row.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Screen {
+pub struct RgbImage {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
@@ -15,7 +15,7 @@ pub struct Screen {
     pub pixels: Vec<[u8; 3]>,
 }
 
-impl Screen {
+impl RgbImage {
     /// Reads a binary PPM with 8 bits per colour, the only format that every QEMU writes.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl Screen {
     }
 }
 
-impl std::fmt::Debug for Screen {
+impl std::fmt::Debug for RgbImage {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "a screen of {} x {}", self.width, self.height)
     }
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn reads_what_qemu_writes_and_nothing_less() {
-        let screen = Screen::from_ppm(b"P6\n2 1\n255\nabcdef").unwrap();
+        let screen = RgbImage::from_ppm(b"P6\n2 1\n255\nabcdef").unwrap();
         assert_eq!((screen.width, screen.height), (2, 1));
         assert_eq!(screen.pixels, [*b"abc", *b"def"]);
         for (bad, why) in [
@@ -82,14 +82,14 @@ mod tests {
             (b"P6\n2 1\n255\nabcde", "middle of a pixel"),
             (b"P6\n2 1\n255\nabc", "1 pixels, not 2 x 1"),
         ] {
-            let error = Screen::from_ppm(bad).unwrap_err().to_string();
+            let error = RgbImage::from_ppm(bad).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
     }
 
     #[test]
     fn a_png_comes_back() {
-        let screen = Screen::from_ppm(b"P6\n1 2\n255\nabcdef").unwrap();
+        let screen = RgbImage::from_ppm(b"P6\n1 2\n255\nabcdef").unwrap();
         let mut file = Vec::new();
         screen.write_png(&mut file).unwrap();
         let mut reader = png::Decoder::new(std::io::Cursor::new(file))

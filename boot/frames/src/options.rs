@@ -12,10 +12,10 @@ use texmap::{Mapper, Order};
 
 /// Scene, mapper and order. `None` leaves the choice to the demo.
 #[derive(Args, Clone, Copy, Debug, Default)]
-pub struct Look {
+pub struct FrameOptions {
     /// Which scene to show [default: ball, or your own model]
     #[arg(long, global = true, value_name = "NAME")]
-    pub scene: Option<Named<&'static str>>,
+    pub scene: Option<NamedValue<&'static str>>,
     /// The mapper, which finds the texel of each pixel.
     #[arg(long, global = true, value_name = "NAME", value_parser = Mappers,
         help = with_default("How textures are mapped", Mapper::default()))]
@@ -23,7 +23,7 @@ pub struct Look {
     /// The order in which the columns of a frame are drawn, and the destination.
     #[arg(long, global = true, value_name = "NAME",
         help = with_default("In which order the columns of a frame are drawn, and where to", name_of(Order::default())))]
-    pub order: Option<Named<Order>>,
+    pub order: Option<NamedValue<Order>>,
 }
 
 /// Returns a help text with the default, in clap's notation.
@@ -37,7 +37,7 @@ fn name_of(order: Order) -> &'static str {
     named.map_or("", |(name, ..)| name)
 }
 
-impl Look {
+impl FrameOptions {
     /// Returns the commands that set these options; they follow [`Command::Hold`].
     pub fn commands(&self) -> impl Iterator<Item = Command> {
         let set = |setting, name: &dyn Display| Some(Command::Set(setting, Some(Word::of(name)?)));
@@ -50,7 +50,7 @@ impl Look {
 
 /// A value that has a name on the command line.
 #[derive(Clone, Copy, Debug)]
-pub struct Named<T>(pub T);
+pub struct NamedValue<T>(pub T);
 
 /// Parses a mapper's name: a listed name, or a mapper within any tolerance.
 #[derive(Clone)]
@@ -83,12 +83,12 @@ impl TypedValueParser for Mappers {
 }
 
 /// The names of all scenes; the user's own model is last.
-static SCENES: LazyLock<Vec<Named<&'static str>>> = LazyLock::new(|| {
+static SCENES: LazyLock<Vec<NamedValue<&'static str>>> = LazyLock::new(|| {
     let built_in = CATALOGUE.iter().map(|entry| entry.name);
-    built_in.chain([Entry::LOADED]).map(Named).collect()
+    built_in.chain([Entry::LOADED]).map(NamedValue).collect()
 });
 
-impl ValueEnum for Named<&'static str> {
+impl ValueEnum for NamedValue<&'static str> {
     fn value_variants<'a>() -> &'a [Self] {
         &SCENES
     }
@@ -99,12 +99,12 @@ impl ValueEnum for Named<&'static str> {
     }
 }
 
-impl ValueEnum for Named<Order> {
+impl ValueEnum for NamedValue<Order> {
     fn value_variants<'a>() -> &'a [Self] {
         &[
-            Named(Order::Polygons),
-            Named(Order::Planes),
-            Named(Order::Buffer),
+            NamedValue(Order::Polygons),
+            NamedValue(Order::Planes),
+            NamedValue(Order::Buffer),
         ]
     }
 
@@ -130,8 +130,13 @@ mod tests {
         for entry in &CATALOGUE {
             assert!(Word::new(entry.name).is_some(), "{}", entry.name);
         }
-        assert_eq!(Named::<Order>::value_variants().len(), Order::ALL.len());
-        for (named, (name, order, _)) in Named::<Order>::value_variants().iter().zip(Order::ALL) {
+        assert_eq!(
+            NamedValue::<Order>::value_variants().len(),
+            Order::ALL.len()
+        );
+        for (named, (name, order, _)) in
+            NamedValue::<Order>::value_variants().iter().zip(Order::ALL)
+        {
             assert_eq!(named.0, order);
             assert_eq!(Order::parse(name), Some(order));
         }

@@ -7,16 +7,16 @@ use scene::Pose;
 use scene::catalogue::Entry;
 use texmap::{Mapper, Order};
 
-use super::accuracy::{self, Accuracy, Jobs};
+use super::accuracy::{self, Accuracy, FrameJobs};
 use super::clock;
-use super::cost::{ANGLE, LENGTH, Swept};
+use super::cost::{ANGLE, LENGTH, SweepPoint};
 use super::stats::Spread;
-use super::subject::with_poses;
 use super::table::{Table, decibels, percent, texels};
+use super::workload::with_poses;
 
 /// A claim and its measurement.
 #[derive(Clone, Debug)]
-pub struct Trial {
+pub struct Claim {
     /// The source of the claim.
     pub place: &'static str,
     /// The claim.
@@ -28,17 +28,17 @@ pub struct Trial {
 }
 
 /// The times of drawing long spans, by the mapper's name.
-struct Loops<'a>(&'a [Swept]);
+struct Loops<'a>(&'a [SweepPoint]);
 
 impl Loops<'_> {
     fn time(&self, mapper: &str, order: Order) -> Option<f64> {
-        let of = |swept: &&Swept| {
-            swept.length == LENGTH
-                && swept.angle == ANGLE
-                && swept.order == order
-                && swept.mapper.to_string() == mapper
+        let of = |point: &&SweepPoint| {
+            point.length == LENGTH
+                && point.angle == ANGLE
+                && point.order == order
+                && point.mapper.to_string() == mapper
         };
-        self.0.iter().find(of).map(|swept| swept.cost.time.median)
+        self.0.iter().find(of).map(|point| point.cost.time.median)
     }
 
     fn ratio(&self, slow: (&str, Order), fast: (&str, Order)) -> String {
@@ -67,14 +67,14 @@ const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
 pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
     let free = Mapper::parse("free")?;
     let entry = Entry::parse("grazing-16")?;
-    let mut jobs = Box::new(Jobs::new());
+    let mut jobs = Box::new(FrameJobs::new());
     let tilts = TILTS.map(|tenths| {
         let pose = Pose {
             roll: ((u64::from(tenths) << 32) / 3600) as u32,
             ..entry.pose(0)
         };
-        let accuracy = with_poses(entry, &[pose], |subject| {
-            accuracy::measure(subject, free, &mut jobs)
+        let accuracy = with_poses(entry, &[pose], |workload| {
+            accuracy::measure(workload, free, &mut jobs)
         });
         (f64::from(tenths) / 10.0, accuracy)
     });
@@ -82,14 +82,14 @@ pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
 }
 
 /// Returns every claim with its measurement.
-pub fn trials(
+pub fn all(
     tables: &[Table],
-    swept: &[Swept],
+    sweep: &[SweepPoint],
     unrolling: Spread,
     tilts: Option<&[(f64, Accuracy)]>,
-) -> Vec<Trial> {
+) -> Vec<Claim> {
     use Order::{Planes, Polygons};
-    let loops = Loops(swept);
+    let loops = Loops(sweep);
     let unit = clock::UNIT;
     let time = |mapper, order| match loops.time(mapper, order) {
         Some(time) => format!("{time:.2}"),
@@ -114,7 +114,7 @@ pub fn trials(
         _ => NOT_MEASURED.into(),
     };
     vec![
-        Trial {
+        Claim {
             place: "57, listing 57.2",
             claimed: "more than twice as fast as listing 57.1",
             measured: loops.ratio(("row-multiply", Polygons), ("row-steps", Polygons)),
@@ -122,7 +122,7 @@ pub fn trials(
                   chain of steps waits for itself. On a card both choose the plane anew for every \
                   pixel.",
         },
-        Trial {
+        Claim {
             place: "58, of listing 58.1",
             claimed: "nearly 10 % from unrolling",
             measured: format!(
@@ -132,7 +132,7 @@ pub fn trials(
             why: "A jump that is foreseen costs next to nothing, so that unrolling gains little, or \
                   loses by its own bookkeeping.",
         },
-        Trial {
+        Claim {
             place: "58, listing 58.2",
             claimed: "columns 2 to 4 times as fast as rows",
             measured: format!(
@@ -144,7 +144,7 @@ pub fn trials(
                   meets another line of the cache. On a card the port writes count: a column \
                   takes one, a row one a pixel.",
         },
-        Trial {
+        Claim {
             place: "58, at the end",
             claimed: "5 to 10 times in all",
             measured: format!(
@@ -153,7 +153,7 @@ pub fn trials(
             ),
             why: "The order of the planes now gains what the loop gained then.",
         },
-        Trial {
+        Claim {
             place: "58, of John Miles's loop",
             claimed: "a table of two steps costs half a cycle to one more than the branch",
             measured: two_steps,
@@ -161,7 +161,7 @@ pub fn trials(
                   the branch is free, as it nearly was. Where they do not learn it, a wrong guess \
                   costs some 15 cycles, and the table none.",
         },
-        Trial {
+        Claim {
             place: "58, listing 58.3",
             claimed: "packed fractions: from 22 cycles to 10, and 9 without a segment prefix",
             measured: format!(
@@ -174,7 +174,7 @@ pub fn trials(
             why: "64-bit code has no segments to swap. Two branches that are not foreseen become \
                   one.",
         },
-        Trial {
+        Claim {
             place: "Free-direction mapping",
             claimed: "looks worst for very small rotations, Hc or Vc near 0",
             measured: match tilts {
@@ -190,7 +190,7 @@ pub fn trials(
                   degrees, where the lines meet the pixels' centres. At a small slope a line keeps \
                   to one row for long and then jumps, so that the same error shows as long seams.",
         },
-        Trial {
+        Claim {
             place: "Subdivision",
             claimed: "the quadratic looks better than the linear with fewer pieces",
             measured: quadratic(tables),
@@ -233,16 +233,16 @@ fn quadratic(tables: &[Table]) -> String {
 }
 
 /// Returns the cells of the table, the header first.
-pub fn cells(trials: &[Trial]) -> Vec<Vec<String>> {
+pub fn cells(claims: &[Claim]) -> Vec<Vec<String>> {
     let head = ["chapter", "claimed", "measured here", "why"].map(String::from);
     let mut cells = vec![head.to_vec()];
-    cells.extend(trials.iter().map(|trial| {
-        let Trial {
+    cells.extend(claims.iter().map(|claim| {
+        let Claim {
             place,
             claimed,
             measured,
             why,
-        } = trial;
+        } = claim;
         vec![
             (*place).into(),
             (*claimed).into(),
@@ -259,17 +259,17 @@ const _: () = assert!(LENGTH as usize == HEIGHT);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trade::cost::Cost;
+    use crate::trade::cost::PixelCost;
     use crate::trade::table::tests::made_up;
 
-    fn swept(mapper: &str, order: Order, time: f64) -> Swept {
+    fn sweep(mapper: &str, order: Order, time: f64) -> SweepPoint {
         let one = Spread::of(&[1.0]);
-        Swept {
+        SweepPoint {
             length: LENGTH,
             angle: ANGLE,
             mapper: Mapper::parse(mapper).unwrap(),
             order,
-            cost: Cost {
+            cost: PixelCost {
                 time: Spread::of(&[time]),
                 to_bare: one,
                 to_packed: one,
@@ -278,8 +278,8 @@ mod tests {
     }
 
     #[test]
-    fn trials_tell_the_figures_of_the_run() {
-        let mut all = Vec::new();
+    fn claims_show_the_figures_of_the_run() {
+        let mut points = Vec::new();
         for (order, scale) in [(Order::Polygons, 1.0), (Order::Planes, 0.5)] {
             for (mapper, time) in [
                 ("row-multiply", 9.0),
@@ -289,26 +289,26 @@ mod tests {
                 ("two-steps", 2.0),
                 ("extract", 1.0),
             ] {
-                all.push(swept(mapper, order, time * scale));
+                points.push(sweep(mapper, order, time * scale));
             }
         }
         let tables = [made_up("tilted", 1.0)];
-        let trials = trials(&tables, &all, Spread::of(&[1.25]), None);
-        let measured: Vec<_> = trials.iter().map(|trial| &trial.measured[..]).collect();
+        let claims = all(&tables, &points, Spread::of(&[1.25]), None);
+        let measured: Vec<_> = claims.iter().map(|claim| &claim.measured[..]).collect();
         assert_eq!(measured[0], "1.50 times");
         assert!(measured[1].starts_with("20.0 %"));
         assert!(measured[3].ends_with("to `extract`, plane by plane, 12.00 times"));
         assert!(measured[4].starts_with("-1.00") && measured[4].contains("-0.50"));
         assert!(measured[6].starts_with("not measured"));
         assert!(measured[7].contains("tilted: "));
-        let cells = cells(&trials);
+        let cells = cells(&claims);
         assert!(cells.iter().all(|line| line.len() == 4));
     }
 
     #[test]
-    fn what_was_left_out_is_said_to_be() {
-        let trials = trials(&[], &[], Spread::of(&[1.0]), None);
-        let missing = trials
+    fn a_claim_without_its_mappers_says_not_measured() {
+        let claims = all(&[], &[], Spread::of(&[1.0]), None);
+        let missing = claims
             .iter()
             .filter(|t| t.measured.contains("not measured"));
         assert!(missing.count() >= 6);
