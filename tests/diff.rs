@@ -118,7 +118,7 @@ fn one_pixel(dump: &mut Dump) {
 }
 
 #[test]
-fn equal_files_are_equal() {
+fn equal_files_have_exit_code_0() {
     let world = World::new();
     world.put("a.dump", page(|_| {}));
     // With the line ends of a terminal.
@@ -138,7 +138,7 @@ fn equal_files_are_equal() {
 }
 
 #[test]
-fn what_differs_is_told_in_a_line() {
+fn a_difference_is_described_in_one_line() {
     let world = World::new();
     world.put("a", page(|_| {}));
     world.put("pixel", page(one_pixel));
@@ -173,7 +173,7 @@ fn what_differs_is_told_in_a_line() {
 }
 
 #[test]
-fn folders_are_matched_by_name_and_all_of_it_is_told() {
+fn folders_are_matched_by_name_and_every_pair_is_reported() {
     let world = World::new();
     for folder in ["a", "b"] {
         world.put(&format!("{folder}/1.dump"), page(|_| {}));
@@ -193,12 +193,12 @@ fn folders_are_matched_by_name_and_all_of_it_is_told() {
         world.diff(&["a", "b"]),
         2,
         &format!("2.png differs: {FIRST}\n1 of 4 pairs differs, 2 could not be compared\n"),
-        "error: 0.dump is in a, b lacks it\nerror: 1.png is in b, a lacks it\n",
+        "error: 0.dump: in a, but missing from b\nerror: 1.png: in b, but missing from a\n",
     );
 }
 
 #[test]
-fn nothing_to_compare_is_not_equal() {
+fn a_comparison_without_files_is_an_error() {
     let world = World::new();
     world.put("a/x.txt", "");
     world.put("b/x.txt", "");
@@ -206,20 +206,20 @@ fn nothing_to_compare_is_not_equal() {
         world.diff(&["a", "b"]),
         2,
         "",
-        "error: there is nothing to compare: no .dump and no .png in a and b\n",
+        "error: a and b: neither folder has a .dump or a .png file to compare\n",
     );
     world.put("file", page(|_| {}));
-    let why = "error: a is a folder and file is none; give two files or two folders\n";
+    let why = "error: a is a folder, file is a file; give two files or two folders\n";
     says(world.diff(&["a", "file"]), 2, "", why);
     says(world.diff(&["file", "a"]), 2, "", why);
-    let gone = "error: gone: it cannot be read: No such file or directory (os error 2)\n";
+    let gone = "error: gone: cannot be read: No such file or directory (os error 2)\n";
     says(world.diff(&["a", "gone"]), 2, "", gone);
     says(world.diff(&["gone", "a"]), 2, "", gone);
     assert_eq!(world.diff(&["a"]).code, Some(2), "wrong usage");
 }
 
 #[test]
-fn what_cannot_be_compared_is_told_with_words() {
+fn files_that_cannot_be_compared_are_an_error_with_the_reason() {
     let world = World::new();
     world.put("a", page(|_| {}));
     world.put("all", file(Content::Memory, |_| {}));
@@ -233,25 +233,26 @@ fn what_cannot_be_compared_is_told_with_words() {
     world.put("a.png", png(|_| {}));
     world.put("order.png", png(|frame| frame.palette.swap(3, 200)));
     let order = "the palettes hold the same colours in another order (entry 03: expected 000303, \
-                 got 320800); indices can't be compared";
+                 got 320800), so indices cannot be compared; give the PNG as this program wrote it";
+    let size = "expected is 320 x 240 pixels, got is 320 x 200; both must have the same size";
     for (a, b, why) in [
         (
             "a",
             "all",
-            "expected is a dump of a page, got one of all memory; take both alike",
+            "expected is a dump of a page, got a dump of all memory; take both with --all or both without",
         ),
-        ("a", "low", "expected is 320 x 240, got 320 x 200"),
-        ("a.png", "low", "expected is 320 x 240, got 320 x 200"),
+        ("a", "low", size),
+        ("a.png", "low", size),
         ("a.png", "order.png", order),
         ("a", "order.png", order),
     ] {
-        let error = format!("error: {a} and {b} can't be compared: {why}\n");
+        let error = format!("error: {a} and {b} cannot be compared: {why}\n");
         says(world.diff(&[a, b]), 2, "", &error);
     }
 }
 
 #[test]
-fn files_that_are_no_dumps_or_frames_are_told_apart() {
+fn a_file_that_is_not_a_valid_dump_or_png_is_an_error_with_the_reason() {
     let world = World::new();
     let good = String::from_utf8(page(|_| {})).unwrap();
     let lines: Vec<_> = good.split_inclusive('\n').collect();
@@ -276,37 +277,37 @@ fn files_that_are_no_dumps_or_frames_are_told_apart() {
         pixels: vec![[1, 2, 3]],
     };
     screen.write_png(&mut rgb).unwrap();
-    let no_dump = "nor is it a PNG; `diff` compares dumps and indexed PNGs";
+    let not_a_png = "and not a PNG; give a dump or an indexed PNG";
     for (name, bytes, words) in [
-        ("empty", Vec::new(), ["line 1: it is no dump", no_dump]),
+        ("empty", Vec::new(), ["line 1: not a dump", not_a_png]),
         (
             "text",
             b"Hello!\n".to_vec(),
-            ["line 1: it is no dump", no_dump],
+            ["line 1: not a dump", not_a_png],
         ),
         (
             "binary",
             (0..=255).cycle().take(99_999).collect(),
-            ["line 1: it is no dump", no_dump],
+            ["line 1: not a dump", not_a_png],
         ),
         (
             "later",
-            good.replacen(lines[0], &framed("crystal-ball dump 5"), 1)
+            good.replacen(lines[0], &framed("crystal-ball dump 6"), 1)
                 .into(),
             [
-                "line 1: it is a dump of version 5; this program reads versions 3 to 4",
+                "line 1: dump version 6 is not supported; this program reads versions 3 to 5",
                 "take the dump again",
             ],
         ),
         (
             "cut",
             lines[..100].concat().into(),
-            ["line 101: it is cut short", "take the dump again"],
+            ["line 101: the dump is cut short", "take the dump again"],
         ),
         (
             "cut in a line",
             good[..99_999].into(),
-            ["line 173: it is cut short", "take the dump again"],
+            ["line 173: the dump is cut short", "take the dump again"],
         ),
         (
             "edited",
@@ -316,26 +317,33 @@ fn files_that_are_no_dumps_or_frames_are_told_apart() {
         (
             "cut.png",
             frame[..frame.len() / 2].into(),
-            ["it is no whole PNG", ""],
+            ["the PNG is damaged or cut short", ""],
         ),
         (
             "end.png",
             frame[..frame.len() - 12].into(),
-            ["it is no whole PNG", ""],
+            ["the PNG is damaged or cut short", ""],
         ),
-        ("head.png", frame[..20].into(), ["it is no whole PNG", ""]),
+        (
+            "head.png",
+            frame[..20].into(),
+            ["the PNG is damaged or cut short", ""],
+        ),
         (
             "rgb.png",
             rgb,
             [
-                "its pixels are Rgb of Eight bits, not indices",
-                "this program's own PNGs",
+                "the PNG has Rgb pixels of 8 bits",
+                "give an indexed PNG of 8 bits, as this program writes",
             ],
         ),
         (
             "huge.png",
             huge,
-            ["its header claims 2147483647 x 2147483647 pixels", ""],
+            [
+                "the PNG's header claims 2147483647 x 2147483647 pixels; the limit is 16777216",
+                "",
+            ],
         ),
     ] {
         world.put(name, bytes);
@@ -355,26 +363,26 @@ fn files_that_are_no_dumps_or_frames_are_told_apart() {
     let both = world.diff(&["gone", "text"]);
     assert!(
         both.errors
-            .starts_with("error: gone: it cannot be read: No such file")
+            .starts_with("error: gone: cannot be read: No such file")
     );
     assert!(both.errors.contains("\nerror: text: line 1: "), "{both:?}");
     let endless = world.diff(&["good", "/dev/zero"]);
     assert_eq!(endless.code, Some(2));
     assert!(
-        endless.errors.contains("/dev/zero: it has more than"),
+        endless.errors.contains("/dev/zero: the file has more than"),
         "{endless:?}"
     );
     fs::create_dir_all(world.path("x/1.dump")).unwrap();
     let folder = world.diff(&["x", "x"]);
     assert_eq!(folder.code, Some(2));
     assert!(
-        folder.errors.contains("x/1.dump: it cannot be read"),
+        folder.errors.contains("x/1.dump: cannot be read"),
         "{folder:?}"
     );
 }
 
 #[test]
-fn the_report_shows_every_pair_that_differs() {
+fn a_report_shows_every_pair_that_differs() {
     let world = World::new();
     for (name, got) in [
         ("1.dump", page(one_pixel)),
@@ -400,14 +408,14 @@ fn the_report_shows_every_pair_that_differs() {
             .ends_with("4 of 6 pairs differ, 1 could not be compared\n")
     );
     assert!(
-        said.errors.ends_with("\nthe report: it differs.html\n"),
+        said.errors.ends_with("\nreport: it differs.html\n"),
         "{said:?}"
     );
     let html = world.read("it differs.html");
     for words in [
         "<h1>4 of 6 pairs differ, 1 could not be compared</h1>",
         FIRST,
-        "6.dump is in a, b lacks it",
+        "6.dump: in a, but missing from b",
         "&lt;3&gt;.dump",
         "All of video memory",
         "<td class=\"n\">1</td>",
@@ -479,7 +487,7 @@ fn a_report_of_equal_files_says_so_and_has_no_folder() {
 }
 
 #[test]
-fn a_report_that_cannot_be_written_is_an_error_after_the_findings() {
+fn a_report_that_cannot_be_written_is_an_error_after_the_differences() {
     let world = World::new();
     world.put("a", page(|_| {}));
     world.put("b", page(one_pixel));
@@ -488,17 +496,17 @@ fn a_report_that_cannot_be_written_is_an_error_after_the_findings() {
     for (report, words) in [
         (
             "nowhere/r.html",
-            "error: the folder nowhere/r-files cannot be made: No such",
+            "error: nowhere/r-files: the folder cannot be created: No such",
         ),
         (
             "blocked.html",
-            "error: the folder blocked-files cannot be made: File exists",
+            "error: blocked-files: the folder cannot be created: File exists",
         ),
         (
             "folder.html",
             "error: folder.html cannot be written: Is a directory",
         ),
-        ("..", "error: .. is no name for a report"),
+        ("..", "error: --report ..: not a file name"),
     ] {
         let said = world.diff(&["a", "b", "--report", report]);
         assert_eq!(said.code, Some(2), "{said:?}");

@@ -268,27 +268,28 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
     // A broken PNG.
     std::fs::write(at("belt.png"), b"\x89PNG").unwrap();
     let wrong = found(copy.path());
-    assert!(wrong[0].contains("belt.png is no golden"), "{wrong:?}");
+    let unreadable = "belt.png: cannot be read as a golden frame";
+    assert!(wrong[0].contains(unreadable), "{wrong:?}");
     std::fs::remove_file(at("belt.png")).unwrap();
     let wrong = found(copy.path());
-    assert!(wrong[0].contains("never blessed"), "{wrong:?}");
+    assert!(wrong[0].contains("the PNG is missing"), "{wrong:?}");
     // An orphan, an invalid description, an unrelated file, an empty folder.
     let refused = |words: &str| {
         let error = format!("{:#}", golden::find(copy.path()).unwrap_err());
         assert!(error.contains(words), "{error}");
     };
     std::fs::remove_file(at("north.toml")).unwrap();
-    refused("north.png is an orphan");
+    refused("north.png: the description north.toml is missing");
     std::fs::remove_file(at("north.png")).unwrap();
     for (description, words) in [
         ("about = \"a\"", "missing field `show`"),
-        ("about = \"a\"\nshow = []", "it shows nothing"),
-        ("about = \"a\"\nshow = [\"x\"]", "'x' is no frame"),
+        ("about = \"a\"\nshow = []", "`show` is empty"),
+        ("about = \"a\"\nshow = [\"x\"]", "'x' is not a frame's name"),
         (
             "about = \"a\"\nshow = [\"0\"]\nmore = 1",
             "unknown field `more`",
         ),
-        ("belt", "belt.toml is no golden's description"),
+        ("belt", "belt.toml: not a valid description of a golden"),
     ] {
         std::fs::write(at("belt.toml"), description).unwrap();
         refused(words);
@@ -336,8 +337,8 @@ fn a_blessing_tells_what_changes_and_makes_the_goldens() {
     };
     let words = bless();
     for line in [
-        "belt: changes: ",
-        "new: is new: A new one.",
+        "belt: expected the golden, got the new frame: ",
+        "new: new: A new one.",
         "2 golden frames blessed",
     ] {
         assert!(words.contains(line), "{words}");

@@ -550,10 +550,10 @@ fn bytes_of_dumps_and_descriptions_are_escaped() {
         (
             &["diff", evil, "a.dump"],
             2,
-            r"\x1b]0;title\x07: it cannot be read",
+            r"\x1b]0;title\x07: cannot be read",
         ),
         (&["bless", "golden"], 1, "line 2: "),
-        (&["bless", "keys"], 1, r"'\x1b[31m' is no frame"),
+        (&["bless", "keys"], 1, r"'\x1b[31m' is not a frame's name"),
         (&["--scene", evil], 2, "for '--scene <NAME>'"),
     ] {
         let (ended, words) = run(path, arguments);

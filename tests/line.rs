@@ -173,12 +173,12 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
         (
             "a lost line",
             |n, line| if n == 100 { Vec::new() } else { line.to_vec() },
-            "stands where 'line 100' should",
+            "expected 'line 100', found",
         ),
         (
             "a repeated line",
             |n, line| line.repeat(1 + usize::from(n == 100)),
-            "stands where 'line 101' should",
+            "expected 'line 101', found",
         ),
         (
             "a dump cut short",
@@ -189,12 +189,12 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
                     line.to_vec()
                 }
             },
-            "cut short: 'line 150' should come here",
+            "cut short: expected 'line 150'",
         ),
         (
             "a dump without its end",
             |n, line| if n == 240 { Vec::new() } else { line.to_vec() },
-            "cut short: 'end' should come here",
+            "cut short: expected 'end'",
         ),
     ];
     for (fault, step, words) in faults {
@@ -231,7 +231,7 @@ fn swapped_lines_are_told_by_their_numbers() {
         _ => line.to_vec(),
     }));
     let words = judged.0.to_string();
-    assert!(words.contains("stands where 'line 100' should"), "{words}");
+    assert!(words.contains("expected 'line 100', found"), "{words}");
 }
 
 /// The changes that a terminal makes to line ends have no effect.

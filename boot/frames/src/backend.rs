@@ -26,12 +26,12 @@ pub fn memory() -> InPlace<Memory> {
     in_place::boxed!(Memory)
 }
 
-/// A VGA with the demo running on it.
+/// The interface of QEMU's VGA and of the emulated VGA, with the demo running.
 pub trait Backend {
     /// Carries out a command and returns the lines of its answer without the closing `ok`.
     ///
     /// # Errors
-    /// The program's `error` line, or the reason why no answer came.
+    /// The demo's `error` line, or the reason why no answer came.
     fn send(&mut self, command: Command) -> anyhow::Result<Vec<String>>;
 
     /// Returns the contents of video memory, with the palette.
@@ -54,7 +54,7 @@ pub trait Backend {
         self.show_with(&FrameOptions::default(), frames)
     }
 
-    /// Does the same as [`Backend::show`], with the options in `options`.
+    /// Does the same as [`Backend::show`], with `options`.
     ///
     /// # Errors
     /// As [`Backend::ask`].
@@ -118,38 +118,41 @@ impl Backend for EmulatedDemo<'_> {
         let faults = self.show.bus().take_faults();
         if let Some(fault) = faults.first() {
             let count = faults.len();
-            bail!("the emulated card finds {count} accesses at fault, the first: {fault}");
+            bail!("'{command}': the emulated VGA found {count} faults; the first: {fault}");
         }
         if let Some(request) = request {
-            bail!("the emulated card has no machine that could '{request:?}'");
+            bail!("'{command}': the emulated VGA has no machine to carry out {request:?}");
         }
         match answer.pop() {
             Some(last) if last == format!("{OK} {command}") => Ok(answer),
             Some(error) => {
                 let error = error.strip_prefix(ERROR).unwrap_or(&error);
-                Err(anyhow!("'{command}' is refused:{error}"))
+                Err(anyhow!("'{command}': refused:{error}"))
             }
-            None => Err(anyhow!("'{command}' was not answered")),
+            None => Err(anyhow!("'{command}': no answer")),
         }
     }
 
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
-        // The program is asked only for the header's contents: which frame this is, and how it was drawn.
+        // The program answers only for the header: which frame this is, and how it was drawn.
         let state = self.send(Command::State)?;
-        let said = |what| {
+        let value = |label| {
             let mut lines = state.iter();
-            let said = lines.find_map(|line| line.strip_prefix(what)?.strip_prefix(' '));
-            said.with_context(|| format!("the state has no line '{what}'"))
+            let value = lines.find_map(|line| line.strip_prefix(label)?.strip_prefix(' '));
+            value.with_context(|| format!("the state has no line '{label}'"))
         };
-        let words = |what| Ok::<_, anyhow::Error>(Some(said(what)?).filter(|said| *said != "none"));
-        let scene = said("scene")?;
-        let mapper =
-            words("drawn")?.map(|name| Word::new(name).context("a mapper's name is a word"));
-        let frame = words("frame")?.map(|name| {
-            FrameName::parse(name.split(' ')).with_context(|| format!("'{name}' is no frame"))
+        let optional =
+            |label| Ok::<_, anyhow::Error>(Some(value(label)?).filter(|value| *value != "none"));
+        let scene = value("scene")?;
+        let mapper = optional("drawn")?.map(|name| {
+            Word::new(name).with_context(|| format!("'{name}' is not a mapper's name"))
         });
-        let motion = words("motion")?.map(|parts| {
-            Motion::parse(parts.split(' ')).with_context(|| format!("'{parts}' is no motion"))
+        let frame = optional("frame")?.map(|name| {
+            FrameName::parse(name.split(' '))
+                .with_context(|| format!("'{name}' is not a frame's name"))
+        });
+        let motion = optional("motion")?.map(|parts| {
+            Motion::parse(parts.split(' ')).with_context(|| format!("'{parts}' is not a motion"))
         });
         let vga = self.show.bus();
         let page = vga.page().map_err(|fault| anyhow!("{fault}"))?;
@@ -194,16 +197,16 @@ mod tests {
 
     /// Compares two ways to a dump: the kernel's, through the VGA's ports, and the inspection from outside.
     #[test]
-    fn what_the_program_reads_back_is_what_the_card_holds() {
+    fn a_dump_through_the_ports_equals_a_dump_from_outside() {
         let mut memory = memory();
         let mut card = EmulatedDemo::new(&mut memory).unwrap();
         for frames in [&[][..], &[FrameName::Number(0)], &[FrameName::Number(7); 3]] {
             card.show(frames).unwrap();
             for content in [Content::Page, Content::Memory] {
                 let seen = card.dump(content).unwrap();
-                let told = card.send(Command::Dump(content)).unwrap();
-                assert_eq!(told, seen.lines());
-                assert_eq!(Dump::from_lines(&told).unwrap(), seen);
+                let sent = card.send(Command::Dump(content)).unwrap();
+                assert_eq!(sent, seen.lines());
+                assert_eq!(Dump::from_lines(&sent).unwrap(), seen);
                 assert_eq!(
                     card.send(Command::Checksums(content)).unwrap(),
                     seen.checksums()
@@ -213,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn a_refused_command_says_why() {
+    fn a_refused_command_has_the_reason_in_its_error() {
         let mut memory = memory();
         let mut card = EmulatedDemo::new(&mut memory).unwrap();
         let far = FrameName::Pose {
@@ -224,7 +227,7 @@ mod tests {
         };
         let error = card.show(&[far]).unwrap_err().to_string();
         assert!(
-            error.ends_with("is refused: a distance is 0 to 00800000"),
+            error.ends_with("refused: a distance is 0 to 00800000"),
             "{error}"
         );
         assert!(card.send(Command::Leave).is_err());

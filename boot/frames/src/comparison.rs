@@ -14,8 +14,8 @@ use system::{Interrupted, interrupted, quote, say};
 use crate::difference::{Capture, compare};
 use crate::report::Report;
 
-/// Extensions of the files to compare in a folder.
-const ENDINGS: [&str; 2] = ["dump", "png"];
+/// The extensions of the files to compare in a folder.
+const EXTENSIONS: [&str; 2] = ["dump", "png"];
 
 /// The result of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -65,11 +65,11 @@ pub fn run(
             let (folder, other) = if a_is_folder { (a, b) } else { (b, a) };
             let why = match other.metadata() {
                 Ok(_) => format!(
-                    "{} is a folder and {} is none; give two files or two folders",
+                    "{} is a folder, {} is a file; give two files or two folders",
                     quote::path(folder),
                     quote::path(other)
                 ),
-                Err(error) => format!("{}: it cannot be read: {error}", quote::path(other)),
+                Err(error) => format!("{}: cannot be read: {error}", quote::path(other)),
             };
             comparison.incomparable(&quote::path(other), &why);
         }
@@ -77,12 +77,12 @@ pub fn run(
     let outcome = comparison.outcome();
     if let (Some(html), Some(report)) = (report, comparison.report) {
         report.write(html)?;
-        say(format_args!("the report: {}", html.display()));
+        say(format_args!("report: {}", html.display()));
     }
     Ok(outcome)
 }
 
-/// The results so far.
+/// A comparison, with the results so far.
 struct Comparison<'a, W> {
     /// The report, if the user requested one.
     report: Option<Report>,
@@ -122,7 +122,7 @@ impl<W: Write> Comparison<'_, W> {
                 Ok(list) => *names = list,
                 Err(error) => {
                     let folder = quote::path(folder);
-                    let why = format!("{folder}: it cannot be read: {error}");
+                    let why = format!("{folder}: cannot be read: {error}");
                     self.incomparable(&folder, &why);
                     return Ok(());
                 }
@@ -142,7 +142,10 @@ impl<W: Write> Comparison<'_, W> {
             if let Some((has, lacks)) = lacks {
                 let (has, lacks) = (quote::path(has), quote::path(lacks));
                 self.pairs += 1;
-                self.incomparable(&shown, &format!("{shown} is in {has}, {lacks} lacks it"));
+                self.incomparable(
+                    &shown,
+                    &format!("{shown}: in {has}, but missing from {lacks}"),
+                );
                 continue;
             }
             let differs = format!("{shown} differs");
@@ -151,7 +154,7 @@ impl<W: Write> Comparison<'_, W> {
         let pairs = self.pairs;
         if pairs == 0 {
             let (a, b) = (quote::path(a), quote::path(b));
-            let why = format!("there is nothing to compare: no .dump and no .png in {a} and {b}");
+            let why = format!("{a} and {b}: neither folder has a .dump or a .png file to compare");
             self.incomparable(&a, &why);
             return Ok(());
         }
@@ -210,7 +213,7 @@ impl<W: Write> Comparison<'_, W> {
                     report.add(name, &expected, &got, &difference);
                 }
             }
-            Err(why) => self.incomparable(name, &format!("{both} can't be compared: {why:#}")),
+            Err(why) => self.incomparable(name, &format!("{both} cannot be compared: {why:#}")),
         }
         Ok(())
     }
@@ -241,8 +244,8 @@ pub(crate) fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
     let mut names = BTreeSet::new();
     for entry in fs::read_dir(folder)? {
         let name = entry?.file_name();
-        let ending = Path::new(&name).extension();
-        if ending.is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known)) {
+        let extension = Path::new(&name).extension();
+        if extension.is_some_and(|found| EXTENSIONS.iter().any(|known| found == *known)) {
             names.insert(name);
         }
     }

@@ -26,11 +26,12 @@ const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const MAX_BYTES: u64 = 1 << 26;
 /// Most pixels of a PNG: a PNG's header may claim more pixels than fit into memory.
 const MAX_PIXELS: u64 = 1 << 24;
-/// One side of a comparison.
+
+/// A captured frame: one side of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[expect(
     clippy::large_enum_variant,
-    reason = "either has its pixels on the heap"
+    reason = "both variants have their pixels on the heap"
 )]
 pub enum Capture {
     /// The contents of a VGA.
@@ -43,8 +44,8 @@ impl Capture {
     /// Reads a PNG or a dump. The content decides which, not the name.
     ///
     /// # Errors
-    /// A file that cannot be read, or is neither; the error has the file's name, and for a damaged dump the
-    /// line.
+    /// A file that cannot be read, or is neither a PNG nor a dump. The error has the file's name, and for a
+    /// damaged dump the line.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         Self::load(path).with_context(|| quote::path(path))
     }
@@ -53,9 +54,9 @@ impl Capture {
         let mut bytes = Vec::new();
         File::open(path)
             .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
-            .context("it cannot be read")?;
+            .context("cannot be read")?;
         if bytes.len() as u64 > MAX_BYTES {
-            bail!("it has more than {MAX_BYTES} bytes: it is neither dump nor frame");
+            bail!("the file has more than {MAX_BYTES} bytes; a dump or a frame's PNG has fewer");
         }
         if bytes.starts_with(PNG) {
             return Ok(Self::Png(read_png(&bytes)?));
@@ -65,7 +66,7 @@ impl Capture {
             anyhow::anyhow!(if bytes.starts_with(MAGIC.as_bytes()) {
                 format!("{error}; take the dump again")
             } else {
-                format!("{error}, nor is it a PNG; `diff` compares dumps and indexed PNGs")
+                format!("{error}, and not a PNG; give a dump or an indexed PNG")
             })
         })?))
     }
@@ -81,24 +82,22 @@ impl Capture {
 
 fn read_png(bytes: &[u8]) -> anyhow::Result<IndexedImage> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    let cut = "it is no whole PNG";
-    let header = decoder.read_header_info().context(cut)?;
+    let damaged = "the PNG is damaged or cut short";
+    let header = decoder.read_header_info().context(damaged)?;
     let (width, height) = (header.width, header.height);
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        bail!("its header claims {width} x {height} pixels; `diff` takes up to {MAX_PIXELS}");
+        bail!("the PNG's header claims {width} x {height} pixels; the limit is {MAX_PIXELS}");
     }
     IndexedImage::read_png(Cursor::new(bytes)).map_err(|error| {
         if error.is::<png::DecodingError>() {
-            error.context(cut)
+            error.context(damaged)
         } else {
-            anyhow::anyhow!(
-                "{error:#}; `diff` compares indices, as this program's own PNGs keep them"
-            )
+            error
         }
     })
 }
 
-/// The difference between two subjects; [`Display`](fmt::Display) describes it in one line.
+/// The difference between two captures; [`Display`](fmt::Display) describes it in one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// The pixels that differ; for dumps of all memory, the bytes.
@@ -133,7 +132,7 @@ pub struct PixelDifference {
     pub pages: Vec<usize>,
 }
 
-/// The place of a pixel.
+/// The position of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PixelPosition {
     /// The plane.
@@ -194,7 +193,7 @@ pub struct HeaderDifference {
     pub got: String,
 }
 
-/// The layout of a subject's pixels.
+/// The layout of a capture's pixels.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct PixelLayout {
     /// Pixels in a line.
@@ -280,10 +279,10 @@ impl PixelLayout {
     }
 }
 
-/// Compares two subjects; `None` if they are equal. A dump and a PNG are compared as frames.
+/// Compares two captures; `None` if they are equal. A dump and a PNG are compared as frames.
 ///
 /// # Errors
-/// Subjects that cannot be compared: different contents, sizes or models, or palettes that hold the same
+/// Captures that cannot be compared: different contents, sizes or models, or palettes that hold the same
 /// colours in a different order. Some programs reorder a PNG's palette, and the indices then mean nothing.
 pub fn compare(expected: &Capture, got: &Capture) -> anyhow::Result<Option<Difference>> {
     let difference = match (expected, got) {
@@ -310,7 +309,7 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
     let (a, b) = (&expected.header, &got.header);
     if a.content != b.content {
         bail!(
-            "expected is a dump of {}, got one of {}; take both alike",
+            "expected is a dump of {}, got a dump of {}; take both with --all or both without",
             content(a.content),
             content(b.content)
         );
@@ -320,7 +319,7 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
         && expected != got
     {
         bail!(
-            "they show different models: expected is of the model file {expected:08x}, got of \
+            "the dumps show different models: expected has the model file {expected:08x}, got has \
              {got:08x}; take both with the same --model and --texture"
         );
     }
@@ -381,7 +380,7 @@ fn content(content: Content) -> &'static str {
 fn same_size<T: PartialEq + fmt::Display>(expected: (T, T), got: (T, T)) -> anyhow::Result<()> {
     if expected != got {
         bail!(
-            "expected is {} x {}, got {} x {}",
+            "expected is {} x {} pixels, got is {} x {}; both must have the same size",
             expected.0,
             expected.1,
             got.0,
@@ -401,7 +400,7 @@ fn same_order(expected: &[Rgb6], got: &[Rgb6]) -> anyhow::Result<()> {
     if set(expected) == set(got) {
         bail!(
             "the palettes hold the same colours in another order (entry {entry:02x}: expected {}, \
-             got {}); indices can't be compared",
+             got {}), so indices cannot be compared; give the PNG as this program wrote it",
             HexColour(*a),
             HexColour(*b)
         );
@@ -582,7 +581,7 @@ mod tests {
     }
 
     /// Returns the result of [`compare`] for a dump and a copy that `change` has modified, as text.
-    fn told(content: Content, change: impl FnOnce(&mut Dump)) -> String {
+    fn described(content: Content, change: impl FnOnce(&mut Dump)) -> String {
         let expected = dump(content);
         let mut got = expected.clone();
         change(&mut got);
@@ -595,14 +594,14 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_told_by_its_first_pixel_their_number_and_their_box() {
-        assert_eq!(told(Content::Page, |_| {}), "equal");
-        let one = told(Content::Page, |got| got.pixels[12 * 320 + 33] ^= 0xFF);
+    fn differing_pixels_of_a_page_are_described_by_their_number_the_first_and_their_box() {
+        assert_eq!(described(Content::Page, |_| {}), "equal");
+        let one = described(Content::Page, |got| got.pixels[12 * 320 + 33] ^= 0xFF);
         assert_eq!(
             one,
             "1 of 76800 pixels differs, first plane 1, x 33, y 12: expected 6c, got 93"
         );
-        let three = told(Content::Page, |got| {
+        let three = described(Content::Page, |got| {
             for (x, y) in [(319, 12), (2, 100), (40, 239)] {
                 got.pixels[y * 320 + x] += 1;
             }
@@ -612,7 +611,7 @@ mod tests {
             "3 of 76800 pixels differ, first plane 3, x 319, y 12: expected 8f, got 90; \
              all in x 2..319, y 12..239, ends included"
         );
-        let all = told(Content::Page, |got| {
+        let all = described(Content::Page, |got| {
             got.pixels.iter_mut().for_each(|p| *p += 1);
         });
         assert!(
@@ -623,10 +622,10 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_told_by_plane_address_and_page() {
-        assert_eq!(told(Content::Memory, |_| {}), "equal");
+    fn differing_bytes_of_memory_are_described_by_plane_address_and_page() {
+        assert_eq!(described(Content::Memory, |_| {}), "equal");
         let at = |plane: usize, address: usize| 4 * address + plane;
-        let some = told(Content::Memory, |got| {
+        let some = described(Content::Memory, |got| {
             // The last bytes of page 0 and of memory, and two bytes of page 2. The first difference is not in
             // plane 0.
             for i in [
@@ -644,18 +643,18 @@ mod tests {
              expected f4, got f5; in plane 0: 2, 1: 0, 2: 1, 3: 1; in page 0: 1; in page 2: 2; \
              past the last page: 1"
         );
-        let past = told(Content::Memory, |got| got.pixels[at(1, 0xE100)] ^= 1);
+        let past = described(Content::Memory, |got| got.pixels[at(1, 0xE100)] ^= 1);
         assert!(
             past.contains("first plane 1, address e100 (past the last page): "),
             "{past}"
         );
-        let before = told(Content::Memory, |got| got.pixels[at(3, 0xE0FF)] ^= 1);
+        let before = described(Content::Memory, |got| got.pixels[at(3, 0xE0FF)] ^= 1);
         assert!(before.contains("e0ff (page 2, x 319, y 239)"), "{before}");
     }
 
     #[test]
-    fn palette_and_header_are_told_for_themselves() {
-        let palette = told(Content::Page, |got| {
+    fn differences_in_palette_and_header_are_described_separately() {
+        let palette = described(Content::Page, |got| {
             got.palette[3] = [0x2A, 0x1C, 0x0F];
             got.palette[255][0] ^= 1;
         });
@@ -663,9 +662,9 @@ mod tests {
             palette,
             "2 of 256 palette entries differ, first 03: expected 000303, got 2a1c0f"
         );
-        let start = told(Content::Page, |got| got.header.start = 0);
+        let start = described(Content::Page, |got| got.header.start = 0);
         assert_eq!(start, "start: expected 4b00, got 0000");
-        let all = told(Content::Memory, |got| {
+        let all = described(Content::Memory, |got| {
             got.pixels[0] = 9;
             got.palette[0] = [1, 1, 1];
             got.header.scene = "cube".into();
@@ -678,19 +677,23 @@ mod tests {
              1 of 256 palette entries differs, first 00: expected 000000, got 010101; \
              scene: expected ball, got cube; frame: expected 480, got none"
         );
-        let model = told(Content::Page, |got| got.header.model_file = Some(0x1A2B));
+        let model = described(Content::Page, |got| got.header.model_file = Some(0x1A2B));
         assert_eq!(model, "model: expected none, got 00001a2b");
     }
 
     #[test]
     fn dumps_of_other_content_or_size_are_not_compared() {
-        let content = told(Content::Page, |got| *got = dump(Content::Memory));
+        let content = described(Content::Page, |got| *got = dump(Content::Memory));
         assert_eq!(
             content,
-            "error: expected is a dump of a page, got one of all memory; take both alike"
+            "error: expected is a dump of a page, got a dump of all memory; take both with --all or both \
+             without"
         );
-        let size = told(Content::Page, |got| got.header.height = 200);
-        assert_eq!(size, "error: expected is 320 x 240, got 320 x 200");
+        let size = described(Content::Page, |got| got.header.height = 200);
+        assert_eq!(
+            size,
+            "error: expected is 320 x 240 pixels, got is 320 x 200; both must have the same size"
+        );
     }
 
     #[test]
@@ -719,19 +722,18 @@ mod tests {
     }
 
     #[test]
-    fn a_frames_palette_may_differ_but_not_be_in_another_order() {
+    fn palettes_may_differ_but_not_hold_the_same_colours_in_another_order() {
         let frame = dump(Content::Page).frame();
         let with = |change: &dyn Fn(&mut Vec<Rgb6>)| {
             let mut other = frame.clone();
             change(&mut other.palette);
-            let subject = Capture::Png(frame.clone());
-            compare(&subject, &Capture::Png(other))
+            compare(&Capture::Png(frame.clone()), &Capture::Png(other))
         };
         let error = with(&|palette| palette.swap(3, 200)).unwrap_err();
         assert_eq!(
             error.to_string(),
             "the palettes hold the same colours in another order (entry 03: expected 000303, \
-             got 320800); indices can't be compared"
+             got 320800), so indices cannot be compared; give the PNG as this program wrote it"
         );
         let palette = |difference: anyhow::Result<Option<Difference>>| {
             difference.unwrap().unwrap().palette.unwrap()

@@ -14,7 +14,7 @@ use protocol::{Content, FrameName, Lines, Motion, Word};
 use crate::indexed::IndexedImage;
 use system::quote::quoted;
 
-/// The contents of a VGA: its palette, and the pixels of a page or of all video memory.
+/// A dump: a VGA's palette, and the pixels of a page or of all video memory.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Dump {
     /// The frame in the dump, and how it was drawn.
@@ -31,7 +31,7 @@ impl fmt::Debug for Dump {
     }
 }
 
-/// Why a text is not a valid dump.
+/// The reason why a text is not a valid dump.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct DumpError {
     /// The number of the invalid line, counted from 1.
@@ -77,8 +77,8 @@ impl Dump {
             return Err(DumpError {
                 line: texts.len() + 1,
                 why: match texts.is_empty() {
-                    true => not_a_dump("it has no end"),
-                    false => "it is cut short: the line has no end".into(),
+                    true => not_a_dump("the line has no end"),
+                    false => "the dump is cut short: this line has no end".into(),
                 },
             });
         }
@@ -189,7 +189,7 @@ impl Dump {
 const OLDEST: u32 = 3;
 
 fn not_a_dump(why: &str) -> String {
-    format!("it is no dump: it does not begin with '{MAGIC} {VERSION}' ({why})")
+    format!("not a dump: a dump begins with '{MAGIC} {VERSION}' ({why})")
 }
 
 /// Parses the lines of a dump, one after the other.
@@ -205,12 +205,12 @@ impl<'a> DumpReader<'a> {
         let found = self.lines.get(self.read).copied();
         self.read += 1;
         let Some(line) = found else {
-            return Err(format!("it is cut short: '{label}' should come here"));
+            return Err(format!("the dump is cut short: expected '{label}'"));
         };
         let rest = line
             .strip_prefix(label)
             .and_then(|rest| rest.strip_prefix(' '));
-        let rest = rest.ok_or_else(|| format!("{} stands where '{label}' should", quoted(line)))?;
+        let rest = rest.ok_or_else(|| format!("expected '{label}', found {}", quoted(line)))?;
         self.whole.add(format_args!("{line}"));
         Ok(rest)
     }
@@ -221,7 +221,7 @@ impl<'a> DumpReader<'a> {
             Ok(version @ OLDEST..=VERSION) => version,
             _ => {
                 return Err(format!(
-                    "it is a dump of version {}; this program reads versions {OLDEST} to {VERSION}",
+                    "dump version {} is not supported; this program reads versions {OLDEST} to {VERSION}",
                     version
                         .parse::<u32>()
                         .map_or(quoted(version), |known| known.to_string())
@@ -235,22 +235,22 @@ impl<'a> DumpReader<'a> {
             let digits = self.line(&row.to_string())?;
             let before = pixels.len();
             hex(digits, &mut pixels)?;
-            let there = pixels.len() - before;
-            if there != row.pixels {
-                return Err(format!("it has {there} pixels, not {}", row.pixels));
+            let found = pixels.len() - before;
+            if found != row.pixels {
+                return Err(format!("expected {} pixels, found {found}", row.pixels));
             }
         }
         let end = self.whole.to_string();
-        let said = self.line("end")?;
-        if format!("end {said}") != end {
+        let found = format!("end {}", self.line("end")?);
+        if found != end {
             return Err(format!(
-                "it ends in {}, but the lines before it make '{end}'",
-                quoted(said)
+                "the lines before this line add up to '{end}', found {}",
+                quoted(found)
             ));
         }
         if self.read < self.lines.len() {
             self.read += 1;
-            return Err("there is more after the dump's end".into());
+            return Err("expected the end of the dump, found another line".into());
         }
         Ok(Dump {
             header,
@@ -265,11 +265,12 @@ impl<'a> DumpReader<'a> {
             "memory" => Content::Memory,
             other => {
                 let other = quoted(other);
-                return Err(format!("content is 'page' or 'memory', not {other}"));
+                return Err(format!("expected 'page' or 'memory', found {other}"));
             }
         };
         let scene = self.line("scene")?;
-        let scene = Word::new(scene).ok_or_else(|| format!("{} is no scene", quoted(scene)))?;
+        let scene =
+            Word::new(scene).ok_or_else(|| format!("{} is not a scene's name", quoted(scene)))?;
         // Version 5 renamed two lines.
         let (model, frame) = match version {
             ..5 => ("pack", "picture"),
@@ -282,19 +283,22 @@ impl<'a> DumpReader<'a> {
                 hex(digits, &mut checksum)?;
                 let checksum: [u8; 4] = checksum
                     .try_into()
-                    .map_err(|_| "a model file's checksum has eight digits")?;
+                    .map_err(|_| "a model file's checksum has eight hex digits")?;
                 Some(u32::from_be_bytes(checksum))
             }
         };
         let mapper = match self.line("mapper")? {
             "none" => None,
-            name => Some(Word::new(name).ok_or_else(|| format!("{} is no mapper", quoted(name)))?),
+            name => Some(
+                Word::new(name)
+                    .ok_or_else(|| format!("{} is not a mapper's name", quoted(name)))?,
+            ),
         };
         let frame = match self.line(frame)? {
             "none" => None,
             name => Some(
                 FrameName::parse(name.split(' '))
-                    .ok_or_else(|| format!("{} is no frame", quoted(name)))?,
+                    .ok_or_else(|| format!("{} is not a frame's name", quoted(name)))?,
             ),
         };
         // Version 3 named a mapper before the first frame, and had no line `motion`.
@@ -304,7 +308,10 @@ impl<'a> DumpReader<'a> {
             _ => match self.line("motion")? {
                 "none" => None,
                 parts => Some(Motion::parse(parts.split(' ')).ok_or_else(|| {
-                    format!("{} is no motion: it has four hex numbers", quoted(parts))
+                    format!(
+                        "{} is not a motion; a motion has four hex numbers",
+                        quoted(parts)
+                    )
                 })?),
             },
         };
@@ -312,7 +319,7 @@ impl<'a> DumpReader<'a> {
         hex(self.line("start")?, &mut start)?;
         let start: [u8; 2] = start
             .try_into()
-            .map_err(|_| "a start address has four digits")?;
+            .map_err(|_| "a start address has four hex digits")?;
         let size = self.line("size")?;
         let sides = size.split_once(' ');
         let sides = sides.and_then(|(w, h)| Some((w.parse::<u16>().ok()?, h.parse::<u16>().ok()?)));
@@ -326,7 +333,10 @@ impl<'a> DumpReader<'a> {
         };
         let (width, height) = sides.filter(legal).ok_or_else(|| {
             let size = quoted(size);
-            format!("{size} is no size: a width in fours up to {MAX_WIDTH}, and a height")
+            format!(
+                "{size} is not a size; a size is a width, which is a multiple of 4 up to {MAX_WIDTH}, \
+                 and a height"
+            )
         })?;
         Ok(Header {
             content,
@@ -350,12 +360,14 @@ impl<'a> DumpReader<'a> {
                 hex(colour, &mut parts)?;
                 if parts.len() - before != 3 || parts[before..].iter().any(|&part| part > 0x3F) {
                     let colour = quoted(colour);
-                    return Err(format!("{colour} is no colour: three parts of 00 to 3f"));
+                    return Err(format!(
+                        "{colour} is not a colour; a colour has three parts from 00 to 3f"
+                    ));
                 }
             }
-            let there = parts.len() / 3 - first;
-            if there != COLOURS_A_LINE {
-                return Err(format!("it has {there} colours, not {COLOURS_A_LINE}"));
+            let found = parts.len() / 3 - first;
+            if found != COLOURS_A_LINE {
+                return Err(format!("expected {COLOURS_A_LINE} colours, found {found}"));
             }
         }
         let (colours, _) = parts.as_chunks::<3>();
@@ -380,7 +392,7 @@ fn hex(digits: &str, bytes: &mut Vec<u8>) -> Result<(), String> {
             _ => None,
         };
         bytes.push(
-            byte.ok_or_else(|| format!("{} is no pair of digits 0 to 9 and a to f", quoted(pair)))?,
+            byte.ok_or_else(|| format!("{} is not two hex digits (0 to 9, a to f)", quoted(pair)))?,
         );
     }
     Ok(())
@@ -425,7 +437,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_comes_back_with_its_motion_and_without_a_frame() {
+    fn a_header_with_a_motion_and_a_header_without_a_frame_are_read_back() {
         let mut dump = dump();
         assert_eq!(
             dump.lines()[4..7],
@@ -445,8 +457,8 @@ mod tests {
         assert_eq!(Dump::from_lines(&dump.lines()).unwrap(), dump);
     }
 
-    /// Returns the lines with the words of versions 3 and 4.
-    fn old_words(lines: Vec<String>) -> Vec<String> {
+    /// Returns the lines with the labels of versions 3 and 4.
+    fn old_labels(lines: Vec<String>) -> Vec<String> {
         let old = |line: String| match line.split_once(' ') {
             Some(("model", checksum)) => format!("pack {checksum}"),
             Some(("frame", name)) => format!("picture {name}"),
@@ -456,21 +468,21 @@ mod tests {
     }
 
     #[test]
-    fn version_4_is_read_with_its_own_words() {
-        let mut lines = old_words(dump().lines());
+    fn version_4_is_read_with_the_labels_of_version_4() {
+        let mut lines = old_labels(dump().lines());
         lines[0] = format!("{MAGIC} 4");
         assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), dump());
         lines[0] = format!("{MAGIC} 5");
         let error = Dump::from_lines(&ended(lines)).unwrap_err();
         assert_eq!(error.line, 4);
-        assert!(error.why.contains("'model' should"), "{error}");
+        assert!(error.why.contains("expected 'model'"), "{error}");
     }
 
     #[test]
     fn version_3_is_read_as_a_dump_without_motion() {
         let mut old = dump();
         old.header.motion = None;
-        let mut lines = old_words(old.lines());
+        let mut lines = old_labels(old.lines());
         lines[0] = format!("{MAGIC} 3");
         assert_eq!(lines.remove(6), "motion none");
         assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), old);
@@ -481,17 +493,17 @@ mod tests {
         lines[0] = format!("{MAGIC} 4");
         let error = Dump::from_lines(&ended(lines)).unwrap_err();
         assert_eq!(error.line, 7);
-        assert!(error.why.contains("'motion' should"), "{error}");
+        assert!(error.why.contains("expected 'motion'"), "{error}");
     }
 
     #[test]
-    fn other_versions_and_motions_are_refused_by_line() {
+    fn an_unknown_version_or_a_wrong_motion_is_refused_with_its_line() {
         for (at, line, why) in [
             (0, "crystal-ball dump 2", "reads versions 3 to 5"),
             (0, "crystal-ball dump 6", "reads versions 3 to 5"),
             (0, "crystal-ball dump four", "version 'four'"),
-            (6, "motion 1 2 3", "it has four hex numbers"),
-            (6, "motion 1 2 3 -4", "it has four hex numbers"),
+            (6, "motion 1 2 3", "a motion has four hex numbers"),
+            (6, "motion 1 2 3 -4", "a motion has four hex numbers"),
         ] {
             let mut lines = dump().lines();
             lines[at] = line.into();

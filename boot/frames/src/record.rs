@@ -47,12 +47,12 @@ impl RecordOptions {
     /// Checks the options before anything is set up.
     ///
     /// # Errors
-    /// What is wrong with the options.
+    /// A file of another type than GIF, and frames that follow too fast for a GIF.
     pub fn check(&self) -> anyhow::Result<()> {
         match self.is_gif()? {
             true if centiseconds(self.every.into()) < SHORTEST => bail!(
-                "--every {}: a GIF shows each frame for at least {SHORTEST}/100 s, which is the time \
-                 of two; record a folder of PNGs, or every second frame",
+                "--every {}: too fast for a GIF, which shows each frame for at least {SHORTEST}/100 s; \
+                 give --every 2 or more, or record a folder of PNGs",
                 self.every
             ),
             _ => Ok(()),
@@ -60,23 +60,23 @@ impl RecordOptions {
     }
 
     fn is_gif(&self) -> anyhow::Result<bool> {
-        let ending = self
+        let extension = self
             .out
             .extension()
-            .map(|ending| ending.to_ascii_lowercase());
-        match ending {
-            Some(ending) if ending == "gif" => Ok(true),
-            Some(ending) if !self.out.is_dir() => bail!(
-                "{}: a recording is a GIF or a folder of PNGs, and no .{}",
+            .map(|extension| extension.to_ascii_lowercase());
+        match extension {
+            Some(extension) if extension == "gif" => Ok(true),
+            Some(extension) if !self.out.is_dir() => bail!(
+                "--out {}: cannot record a .{}; give a name that ends in .gif, or a folder",
                 self.out.display(),
-                ending.display()
+                extension.display()
             ),
             _ => Ok(false),
         }
     }
 
-    /// Records the frames of `machine`, drawn with the options in `options`; `emulated` draws the same frames
-    /// for comparison. `wrote` receives each file's path.
+    /// Records the frames of `machine`, drawn with `options`; `emulated` draws the same frames for
+    /// comparison. `wrote` receives each file's path.
     ///
     /// # Errors
     /// A VGA fails or a file cannot be written. The GIF, and each PNG, is either complete or missing.
@@ -96,7 +96,7 @@ impl RecordOptions {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            let frame = seen(machine, emulated, FrameName::Number(number))?;
+            let frame = captured(machine, emulated, FrameName::Number(number))?;
             step.at(done);
             Ok((number, frame))
         });
@@ -105,7 +105,7 @@ impl RecordOptions {
             return Ok(wrote(&self.out)?);
         }
         std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("{} cannot be made", self.out.display()))?;
+            .with_context(|| format!("{}: the folder cannot be created", self.out.display()))?;
         frames.try_for_each(|recorded| {
             let (number, frame) = recorded?;
             let png = self.out.join(format!("frame-{number:06}.png"));
@@ -149,7 +149,7 @@ fn centiseconds(ticks: u64) -> u64 {
 }
 
 /// Shows `frame` on both VGAs, and returns the frame that QEMU's VGA holds.
-fn seen(
+fn captured(
     machine: &mut impl Backend,
     emulated: &mut EmulatedDemo<'_>,
     frame: FrameName,
@@ -228,17 +228,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_recording_is_told_before_anything_is_set_up() {
+    fn an_impossible_recording_is_refused_before_anything_is_set_up() {
         for (every, out) in [(2, "a.gif"), (600, "A.GIF"), (1, "folder"), (1, "/tmp")] {
             options(every, out).check().unwrap();
         }
         for (every, out, why) in [
-            (1, "a.gif", "--every 1: a GIF shows each frame for"),
-            (
-                3,
-                "a.mp4",
-                "a.mp4: a recording is a GIF or a folder of PNGs, and no .mp4",
-            ),
+            (1, "a.gif", "--every 1: too fast for a GIF"),
+            (3, "a.mp4", "--out a.mp4: cannot record a .mp4"),
         ] {
             let error = options(every, out).check().unwrap_err().to_string();
             assert!(error.starts_with(why), "{error}");
@@ -246,7 +242,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gif_is_the_frames_and_lasts_as_long() {
+    fn a_gif_shows_every_frame_and_has_their_total_time() {
         let mut random = seeded::generator();
         let palette: Vec<_> = (0..=255u8).map(|i| [i / 4, i % 64, i / 8]).collect();
         let mut frame = IndexedImage {

@@ -20,7 +20,7 @@ use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
-/// Which frames to show, and how.
+/// The options of `replay`: the frames, and how to show them.
 #[derive(Args, Clone, Debug)]
 pub struct ReplayOptions {
     /// Dumps, indexed PNGs, or folders of them; if a folder has a dump and a PNG of the same name, the dump
@@ -59,7 +59,9 @@ impl ReplayOptions {
     /// terminal, or cannot be written.
     pub fn run(&self, wrote: impl FnOnce(&Path) -> std::io::Result<()>) -> anyhow::Result<()> {
         if self.sheet.is_none() && !stdout().is_terminal() {
-            bail!("standard output is no terminal to play in; --sheet FILE.png makes a sheet");
+            bail!(
+                "standard output is not a terminal; give --sheet FILE.png to write a contact sheet"
+            );
         }
         let files = self.files()?;
         let mut frames = Vec::new();
@@ -92,7 +94,8 @@ impl ReplayOptions {
                 files.push(path.clone());
                 continue;
             }
-            let names = list(path).with_context(|| format!("{} cannot be read", path.display()))?;
+            let names =
+                list(path).with_context(|| format!("{}: cannot be read", path.display()))?;
             let frames = names.iter().map(|name| path.join(name));
             // A dump and a PNG of the same name are the same frame.
             files.extend(frames.filter(|file| {
@@ -101,7 +104,7 @@ impl ReplayOptions {
             }));
         }
         if files.is_empty() {
-            bail!("there is no dump and no PNG in what was named");
+            bail!("no .dump or .png file to show; give files, or folders that contain some");
         }
         Ok(files)
     }
@@ -115,7 +118,10 @@ impl ReplayOptions {
                 let (rows, columns) = Term::stdout().size();
                 let mut text = in_blocks(frame, columns.into(), rows.saturating_sub(1).into());
                 let count = frames.len();
-                let _ = write!(text, "{RESET}{ERASE}{i} of {count}; Ctrl-C ends it");
+                let _ = write!(
+                    text,
+                    "{RESET}{ERASE}frame {i} of {count}; press Ctrl-C to stop"
+                );
                 screen.write(&text)?;
                 due += time;
                 while Instant::now() < due {
@@ -147,7 +153,7 @@ impl AlternateScreen {
     fn write(&self, text: &str) -> anyhow::Result<()> {
         let mut out = stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-        written.context("the terminal cannot be written")
+        written.context("cannot write to the terminal")
     }
 }
 
@@ -312,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn a_smaller_frame_has_the_mean_of_what_it_leaves_out() {
+    fn each_pixel_of_a_shrunk_frame_is_the_mean_of_the_pixels_it_replaces() {
         let frame = halves(320, 240);
         assert_eq!(shrunk(&frame, 320, 240).pixels[160], [255; 3]);
         let third = shrunk(&frame, 3, 2).pixels;
@@ -321,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_has_every_frame_in_its_place() {
+    fn a_sheet_has_every_frame_with_its_name_below() {
         let frames = vec![halves(320, 240); 5];
         let names: Vec<_> = (0..5).map(|i| format!("frame-{i:06}")).collect();
         let sheet = lay_out(&frames, &names);
@@ -346,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_loses_its_middle_and_names_of_two_folders_have_theirs() {
+    fn a_long_name_loses_its_middle_and_names_from_two_folders_include_the_folder() {
         for (name, letters, fits) in [
             ("frame-000123", 12, "frame-000123"),
             ("frame-000123", 11, "fram..00123"),
@@ -365,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_fit_the_terminal() {
+    fn a_frame_in_block_characters_fits_the_terminal() {
         for (columns, rows) in [(80, 24), (400, 100), (10, 200), (1, 1), (0, 0)] {
             let text = in_blocks(&halves(320, 240), columns, rows);
             let lines: Vec<_> = text.lines().collect();

@@ -109,12 +109,12 @@ impl Report {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, html: &Path) -> anyhow::Result<()> {
-        let name = || format!("{} is no name for a report", html.display());
+        let name = || format!("--report {}: not a file name", html.display());
         let mut folder_name = html.file_stem().with_context(name)?.to_owned();
         folder_name.push("-files");
         let folder = html.with_file_name(&folder_name);
         if !self.different.is_empty() && !folder.is_dir() {
-            let context = || format!("the folder {} cannot be made", folder.display());
+            let context = || format!("{}: the folder cannot be created", folder.display());
             fs::create_dir(&folder).with_context(context)?;
         }
         let url = url(&folder_name);
@@ -122,9 +122,9 @@ impl Report {
         let mut names = UniqueNames::default();
         for (i, pair) in self.different.iter().enumerate() {
             let name = names.take(&pair.name);
-            let put = |ending: &str, make: WriteFile| {
-                let path = folder.join(format!("{name}-{ending}"));
-                write_atomically(&path, make)
+            let put = |suffix: &str, write: WriteFile| {
+                let path = folder.join(format!("{name}-{suffix}"));
+                write_atomically(&path, write)
             };
             pair.section(&mut page, i, &format!("{url}/{name}"), &put)?;
         }
@@ -148,7 +148,7 @@ impl Report {
         };
         match self.incomparable.len() {
             0 => title,
-            1 if all == 1 => "It could not be compared".into(),
+            1 if all == 1 => "The pair could not be compared".into(),
             n => format!("{title}, {n} could not be compared"),
         }
     }
@@ -238,11 +238,11 @@ impl Report {
 /// The legend of the colours, and the controls for the frames' scale.
 const LEGEND: &str = r#"<aside class="bar">
 <ul class="legend" aria-label="Colours of the difference images">
-<li><i class="ramp"></i>differs: near to far in colour</li>
-<li><i class="same-colour"></i>another index, the same colour</li>
-<li><i class="same-index"></i>the same index, another colour</li>
+<li><i class="ramp"></i>different colour: similar to very different</li>
+<li><i class="same-colour"></i>different index, same colour</li>
+<li><i class="same-index"></i>same index, different colour</li>
 <li><i class="same"></i>equal</li>
-<li><i class="bounds"></i>box around what differs</li>
+<li><i class="bounds"></i>box around the differences</li>
 </ul>
 <div class="controls">
 <span class="scale" role="radiogroup" aria-label="Scale">
@@ -392,9 +392,9 @@ impl Pair {
         };
         let count = pixels.count;
         let summary = match count {
-            1 => "Its values".into(),
-            ..=LISTED => format!("The values of all {count}"),
-            _ => format!("The values of the first {LISTED}"),
+            1 => "Value of the pixel".into(),
+            ..=LISTED => format!("Values of all {count} pixels"),
+            _ => format!("Values of the first {LISTED} pixels"),
         };
         let at = match layout.memory {
             Some(_) => "<th>address</th><th>page</th>",
@@ -436,8 +436,8 @@ impl Pair {
             return;
         };
         let entries = match colours.count {
-            1 => "The palette's entry that differs".into(),
-            n => format!("The palette's {n} entries that differ"),
+            1 => "Palette entry that differs".into(),
+            n => format!("{n} palette entries that differ"),
         };
         let _ = write!(
             page,
@@ -699,7 +699,7 @@ mod tests {
     }
 
     #[test]
-    fn the_difference_shows_how_far_the_colours_are() {
+    fn the_difference_image_shows_how_much_colours_differ() {
         let expected = frame(&[0, 0, 1, 1]);
         let mut got = frame(&[1, 3, 2, 1]);
         let pixels = |got: &IndexedImage| difference(&expected, got).pixels;
@@ -715,7 +715,7 @@ mod tests {
     }
 
     #[test]
-    fn the_legend_has_the_images_colours() {
+    fn the_legend_has_the_colours_of_the_difference_image() {
         for (name, [red, green, blue]) in [
             ("near", NEAR),
             ("far", FAR),
@@ -728,7 +728,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_harmless_wherever_they_stand() {
+    fn names_are_escaped_in_the_page_and_in_file_names() {
         let folder = tempfile::tempdir().unwrap();
         let html = folder.path().join("a b%#é.html");
         let (expected, got) = (frame(&[0; 8]), frame(&[1; 8]));
@@ -761,7 +761,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_fetched_from_elsewhere() {
+    fn a_report_loads_nothing_from_the_network() {
         for text in [STYLE, SCRIPT, LEGEND] {
             assert!(!text.contains("//") || text == SCRIPT && !text.contains("://"));
             assert!(!text.contains("@import"));

@@ -15,13 +15,13 @@ use crate::options::FrameOptions;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 
-/// Which frames to write, how much of video memory, and where to.
+/// The options of `dump` and `emulate`: the frames, how much of video memory, and the folder.
 #[derive(Args, Clone, Debug)]
 pub struct DumpOptions {
     #[command(flatten)]
     which: FrameSelection,
-    /// Draw in reduced quality, as for a solid that moves this much in one tick: the changes of the three
-    /// angles and of the distance, in hex and modulo 2^32, as on the line `motion` of a dump
+    /// Draw in reduced quality, as for a solid that moves this much in one tick: the changes of yaw, pitch,
+    /// roll and distance, in hex and modulo 2^32, as on the line `motion` of a dump
     #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
         value_parser = hex, action = ArgAction::Set)]
     motion: Option<Vec<u32>>,
@@ -36,14 +36,14 @@ pub struct DumpOptions {
 #[derive(Args, Clone, Debug)]
 #[group(required = true, multiple = true)]
 struct FrameSelection {
-    /// The frame with this number; can be repeated
+    /// The frame with this number; give the option again for more frames
     #[arg(long = "frame", value_name = "N")]
     single: Vec<u32>,
-    /// DumpOptions A up to B, excluding B (A..=B includes B)
+    /// Frames A up to B, excluding B (A..=B includes B)
     #[arg(long = "frames", value_name = "A..B", value_parser = range)]
     ranges: Vec<RangeInclusive<u32>>,
-    /// The solid in this pose: yaw, pitch and roll as 32-bit fractions of a turn and the distance in 16.16
-    /// fixed point, in hex, as in the descriptions in tests/golden
+    /// The solid in this pose: yaw, pitch and roll as 32-bit fractions of a turn (40000000 is a quarter), and
+    /// the distance in 16.16 fixed point (50000 is 5 units), all in hex
     #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
         value_parser = hex)]
     pose: Vec<u32>,
@@ -53,7 +53,7 @@ struct FrameSelection {
 fn hex(text: &str) -> Result<u32, String> {
     // `from_str_radix` would accept a plus sign.
     if !text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
-        return Err("a hex number has the digits 0 to 9 and a to f".into());
+        return Err("not a hex number; its digits are 0 to 9 and a to f".into());
     }
     u32::from_str_radix(text, 16).map_err(|error| error.to_string())
 }
@@ -61,10 +61,10 @@ fn hex(text: &str) -> Result<u32, String> {
 /// Parses `A..B` or `A..=B`.
 pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
     let parts = text.split_once("..");
-    let (first, last) = parts.ok_or("two frame numbers are written A..B, or A..=B")?;
+    let (first, last) = parts.ok_or("not a range; give two frame numbers as A..B or A..=B")?;
     let number = |text: &str| {
         let number = text.parse::<u32>();
-        number.map_err(|error| format!("'{text}' is no frame number: {error}"))
+        number.map_err(|error| format!("'{text}' is not a frame number: {error}"))
     };
     let first = number(first)?;
     let last = match last.strip_prefix('=') {
@@ -73,7 +73,7 @@ pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
     };
     last.map(|last| first..=last)
         .filter(|range| !range.is_empty())
-        .ok_or_else(|| "there is no frame in it".into())
+        .ok_or_else(|| "the range has no frame; A..B excludes B, A..=B includes B".into())
 }
 
 impl DumpOptions {
@@ -117,8 +117,8 @@ impl DumpOptions {
         })
     }
 
-    /// Shows each frame on `card`, drawn with the options in `options`, and writes its dump and its PNG. `wrote`
-    /// receives the path of each file.
+    /// Shows each frame on a VGA, drawn with `options`, and writes its dump and its PNG. `wrote` receives the
+    /// path of each file.
     ///
     /// # Errors
     /// The VGA fails or a file cannot be written; the files written before are complete.
@@ -129,7 +129,7 @@ impl DumpOptions {
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
     ) -> anyhow::Result<()> {
         std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("{} cannot be made", self.out.display()))?;
+            .with_context(|| format!("{}: the folder cannot be created", self.out.display()))?;
         let content = match self.all {
             true => Content::Memory,
             false => Content::Page,
@@ -225,7 +225,7 @@ mod tests {
             mapper: Mapper::parse("exact"),
             order: None,
         };
-        let mut drawn = |motion| {
+        let mut draw = |motion| {
             let mut files = Vec::new();
             let wrote = |file: &Path| {
                 files.push(file.to_path_buf());
@@ -234,7 +234,7 @@ mod tests {
             frames(motion).write(&mut card, &options, wrote).unwrap();
             Dump::read(&std::fs::read(&files[0]).unwrap()).unwrap()
         };
-        let again = drawn(Some(vec![yaw, pitch, roll, distance]));
+        let again = draw(Some(vec![yaw, pitch, roll, distance]));
         let start = again.header.start;
         assert_eq!(
             again.header,
@@ -244,27 +244,27 @@ mod tests {
             }
         );
         assert!(again.pixels == shown.pixels && again.palette == shown.palette);
-        let whole = drawn(None);
-        assert_eq!(whole.header.motion, None);
-        assert!(whole.pixels != shown.pixels);
+        let full = draw(None);
+        assert_eq!(full.header.motion, None);
+        assert!(full.pixels != shown.pixels);
         // The same frame in both qualities gives different files: neither overwrites the other.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
     }
 
     #[test]
-    fn ranges_are_half_open_unless_they_say_otherwise() {
+    fn a_range_excludes_its_end_unless_it_is_written_with_an_equals_sign() {
         assert_eq!(range("0..2"), Ok(0..=1));
         assert_eq!(range("7..=7"), Ok(7..=7));
         assert_eq!(range("4294967295..=4294967295"), Ok(u32::MAX..=u32::MAX));
         for (text, why) in [
-            ("5", "written A..B"),
-            ("..5", "no frame number"),
-            ("5..", "no frame number"),
-            ("0..x", "no frame number"),
-            ("0..4294967296", "no frame number"),
-            ("0..0", "no frame in it"),
-            ("5..5", "no frame in it"),
-            ("6..=5", "no frame in it"),
+            ("5", "as A..B"),
+            ("..5", "not a frame number"),
+            ("5..", "not a frame number"),
+            ("0..x", "not a frame number"),
+            ("0..4294967296", "not a frame number"),
+            ("0..0", "the range has no frame"),
+            ("5..5", "the range has no frame"),
+            ("6..=5", "the range has no frame"),
         ] {
             let error = range(text).unwrap_err();
             assert!(error.contains(why), "{text}: {error}");
