@@ -21,7 +21,7 @@ const AFFINE_BITS: u32 = 7;
 
 /// A golden's scene.
 fn scene(golden: &Golden) -> &'static Entry<'static> {
-    let scene = golden.options.scene.and_then(|scene| Entry::parse(scene.0));
+    let scene = golden.options.scene.and_then(Entry::parse);
     scene.unwrap_or(&CATALOGUE[0])
 }
 

@@ -8,8 +8,7 @@ use std::process::{Command, Output, Stdio};
 use frames::dump::Dump;
 use frames::indexed::IndexedImage;
 use frames::rgb::RgbImage;
-use protocol::dump::{Header, PLANE_BYTES};
-use protocol::{Content, FrameName, Word};
+use protocol::Content;
 use tempfile::TempDir;
 
 /// A folder of files to compare; the program runs in it.
@@ -35,7 +34,7 @@ impl World {
         String::from_utf8(fs::read(self.path(name)).unwrap()).unwrap()
     }
 
-    fn diff(&self, arguments: &[&str]) -> Said {
+    fn diff(&self, arguments: &[&str]) -> Exit {
         let mut program = Command::new(env!("CARGO_BIN_EXE_crystal-ball"));
         program.arg("diff").args(arguments).stdin(Stdio::null());
         let Output {
@@ -43,7 +42,7 @@ impl World {
             stdout,
             stderr,
         } = program.current_dir(self.0.path()).output().unwrap();
-        Said {
+        Exit {
             code: status.code(),
             out: String::from_utf8(stdout).unwrap(),
             errors: String::from_utf8(stderr).unwrap(),
@@ -53,42 +52,20 @@ impl World {
 
 /// The program's exit code and output.
 #[derive(Debug, PartialEq, Eq)]
-struct Said {
+struct Exit {
     code: Option<i32>,
     out: String,
     errors: String,
 }
 
 #[track_caller]
-fn says(said: Said, code: i32, out: &str, errors: &str) {
-    let expected = Said {
+fn check(exit: Exit, code: i32, out: &str, errors: &str) {
+    let expected = Exit {
         code: Some(code),
         out: out.into(),
         errors: errors.into(),
     };
-    assert_eq!(said, expected);
-}
-
-fn dump(content: Content) -> Dump {
-    let pixels = match content {
-        Content::Page => 320 * 240,
-        Content::Memory => 4 * PLANE_BYTES,
-    };
-    Dump {
-        header: Header {
-            content,
-            scene: "ball".into(),
-            model_file: None,
-            mapper: Word::new("exact"),
-            frame: Some(FrameName::Number(480)),
-            motion: None,
-            start: 0x4B00,
-            width: 320,
-            height: 240,
-        },
-        palette: std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8]),
-        pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
-    }
+    assert_eq!(exit, expected);
 }
 
 /// A page's dump as a file, after `change`.
@@ -97,7 +74,7 @@ fn page(change: impl FnOnce(&mut Dump)) -> Vec<u8> {
 }
 
 fn file(content: Content, change: impl FnOnce(&mut Dump)) -> Vec<u8> {
-    let (mut dump, mut bytes) = (dump(content), Vec::new());
+    let (mut dump, mut bytes) = (Dump::example(content), Vec::new());
     change(&mut dump);
     dump.write(&mut bytes).unwrap();
     bytes
@@ -105,7 +82,7 @@ fn file(content: Content, change: impl FnOnce(&mut Dump)) -> Vec<u8> {
 
 /// A PNG as a file, after `change`.
 fn png(change: impl FnOnce(&mut IndexedImage)) -> Vec<u8> {
-    let (mut frame, mut bytes) = (dump(Content::Page).frame(), Vec::new());
+    let (mut frame, mut bytes) = (Dump::example(Content::Page).frame(), Vec::new());
     change(&mut frame);
     frame.write_png(&mut bytes).unwrap();
     bytes
@@ -133,7 +110,7 @@ fn equal_files_have_exit_code_0() {
         ("all.dump", "all.dump", 262_144),
     ] {
         let line = format!("equal: {a} and {b}, {pixels} pixels\n");
-        says(world.diff(&[a, b]), 0, &line, "");
+        check(world.diff(&[a, b]), 0, &line, "");
     }
 }
 
@@ -168,7 +145,7 @@ fn a_difference_is_described_in_one_line() {
         ),
     ] {
         let line = format!("{b} differs from {a}: {line}\n");
-        says(world.diff(&[a, b]), 1, &line, "");
+        check(world.diff(&[a, b]), 1, &line, "");
     }
 }
 
@@ -182,14 +159,14 @@ fn folders_are_matched_by_name_and_every_pair_is_reported() {
         world.put(&format!("{folder}/sub/{folder}.dump"), "not compared");
     }
     let equal = "equal: 2 pairs, 153600 pixels\n";
-    says(world.diff(&["a", "b"]), 0, equal, "");
+    check(world.diff(&["a", "b"]), 0, equal, "");
     world.put("b/2.png", png(|frame| frame.pixels[321] ^= 1));
     let different = format!("2.png differs: {FIRST}\n1 of 2 pairs differs\n");
-    says(world.diff(&["a", "b/"]), 1, &different, "");
+    check(world.diff(&["a", "b/"]), 1, &different, "");
     // Missing files are reported first, and the rest is compared nevertheless.
     world.put("a/0.dump", page(|_| {}));
     world.put("b/1.png", png(|_| {}));
-    says(
+    check(
         world.diff(&["a", "b"]),
         2,
         &format!("2.png differs: {FIRST}\n1 of 4 pairs differs, 2 could not be compared\n"),
@@ -202,7 +179,7 @@ fn a_comparison_without_files_is_an_error() {
     let world = World::new();
     world.put("a/x.txt", "");
     world.put("b/x.txt", "");
-    says(
+    check(
         world.diff(&["a", "b"]),
         2,
         "",
@@ -210,11 +187,11 @@ fn a_comparison_without_files_is_an_error() {
     );
     world.put("file", page(|_| {}));
     let why = "error: a is a folder, file is a file; give two files or two folders\n";
-    says(world.diff(&["a", "file"]), 2, "", why);
-    says(world.diff(&["file", "a"]), 2, "", why);
+    check(world.diff(&["a", "file"]), 2, "", why);
+    check(world.diff(&["file", "a"]), 2, "", why);
     let gone = "error: gone: cannot be read: No such file or directory (os error 2)\n";
-    says(world.diff(&["a", "gone"]), 2, "", gone);
-    says(world.diff(&["gone", "a"]), 2, "", gone);
+    check(world.diff(&["a", "gone"]), 2, "", gone);
+    check(world.diff(&["gone", "a"]), 2, "", gone);
     assert_eq!(world.diff(&["a"]).code, Some(2), "wrong usage");
 }
 
@@ -247,7 +224,7 @@ fn files_that_cannot_be_compared_are_an_error_with_the_reason() {
         ("a", "order.png", order),
     ] {
         let error = format!("error: {a} and {b} cannot be compared: {why}\n");
-        says(world.diff(&[a, b]), 2, "", &error);
+        check(world.diff(&[a, b]), 2, "", &error);
     }
 }
 
@@ -349,13 +326,13 @@ fn a_file_that_is_not_a_valid_dump_or_png_is_an_error_with_the_reason() {
         world.put(name, bytes);
         world.put("good", &good);
         for arguments in [[name, "good"], ["good", name]] {
-            let said = world.diff(&arguments);
-            assert_eq!((said.code, said.out.as_str()), (Some(2), ""), "{said:?}");
+            let exit = world.diff(&arguments);
+            assert_eq!((exit.code, exit.out.as_str()), (Some(2), ""), "{exit:?}");
             let begin = format!("error: {name}: ");
-            assert!(said.errors.starts_with(&begin), "{said:?}");
-            assert_eq!(said.errors.lines().count(), 1, "{said:?}");
+            assert!(exit.errors.starts_with(&begin), "{exit:?}");
+            assert_eq!(exit.errors.lines().count(), 1, "{exit:?}");
             for words in words {
-                assert!(said.errors.contains(words), "{words}: {said:?}");
+                assert!(exit.errors.contains(words), "{words}: {exit:?}");
             }
         }
     }
@@ -401,15 +378,15 @@ fn a_report_shows_every_pair_that_differs() {
     world.put("a/5.png", png(|_| {}));
     world.put("b/5.png", png(|frame| frame.pixels.fill(7)));
     world.put("a/6.dump", page(|_| {}));
-    let said = world.diff(&["a", "b", "--report", "it differs.html"]);
-    assert_eq!(said.code, Some(2));
+    let exit = world.diff(&["a", "b", "--report", "it differs.html"]);
+    assert_eq!(exit.code, Some(2));
     assert!(
-        said.out
+        exit.out
             .ends_with("4 of 6 pairs differ, 1 could not be compared\n")
     );
     assert!(
-        said.errors.ends_with("\nreport: it differs.html\n"),
-        "{said:?}"
+        exit.errors.ends_with("\nreport: it differs.html\n"),
+        "{exit:?}"
     );
     let html = world.read("it differs.html");
     for words in [
@@ -475,13 +452,13 @@ fn decode(path: &Path) -> Vec<[u8; 3]> {
 fn a_report_of_equal_files_says_so_and_has_no_folder() {
     let world = World::new();
     world.put("a.png", png(|_| {}));
-    let said = world.diff(&["a.png", "a.png", "--report", "r.html"]);
-    assert_eq!(said.code, Some(0), "{said:?}");
+    let exit = world.diff(&["a.png", "a.png", "--report", "r.html"]);
+    assert_eq!(exit.code, Some(0), "{exit:?}");
     assert!(world.read("r.html").contains("<h1>Nothing differs</h1>"));
     assert!(!world.path("r-files").exists());
     // A report about files that could not be compared does not claim that nothing differs.
-    let said = world.diff(&["a.png", "gone", "--report", "r.html"]);
-    assert_eq!(said.code, Some(2), "{said:?}");
+    let exit = world.diff(&["a.png", "gone", "--report", "r.html"]);
+    assert_eq!(exit.code, Some(2), "{exit:?}");
     let html = world.read("r.html");
     assert!(!html.contains("Nothing differs") && html.contains("No such file"));
 }
@@ -508,10 +485,10 @@ fn a_report_that_cannot_be_written_is_an_error_after_the_differences() {
         ),
         ("..", "error: --report ..: not a file name"),
     ] {
-        let said = world.diff(&["a", "b", "--report", report]);
-        assert_eq!(said.code, Some(2), "{said:?}");
-        assert_eq!(said.out, format!("b differs from a: {FIRST}\n"));
-        assert!(said.errors.starts_with(words), "{said:?}");
+        let exit = world.diff(&["a", "b", "--report", report]);
+        assert_eq!(exit.code, Some(2), "{exit:?}");
+        assert_eq!(exit.out, format!("b differs from a: {FIRST}\n"));
+        assert!(exit.errors.starts_with(words), "{exit:?}");
     }
     assert!(!world.path("blocked.html").exists());
     let equal = world.diff(&["a", "a", "--report", "nowhere/r.html"]);

@@ -103,7 +103,7 @@ fn qemu_shows_and_holds_every_golden() {
 
 /// The kind of scene that a golden shows.
 fn kind_of_scene(golden: &Golden) -> &'static str {
-    match golden.options.scene.map_or("ball", |scene| scene.0) {
+    match golden.options.scene.unwrap_or("ball") {
         "ball" | "cube" => "convex solid",
         "knot" => "solid that hides parts of itself",
         "facing" | "tilted" | "wall" => "single face",
@@ -132,7 +132,7 @@ fn goldens_sent_byte_by_byte_are_of_every_kind() {
     });
     assert_eq!(of_mapper, [""; 0], "no golden with such a mapper is sent");
     let of_order = covered(|a, b| {
-        let [a, b] = [a, b].map(|golden| golden.options.order.map(|order| order.0));
+        let [a, b] = [a, b].map(|golden| golden.options.order);
         a.unwrap_or_default() == b.unwrap_or_default()
     });
     assert_eq!(of_order, [""; 0], "no golden with such an order is sent");
@@ -148,7 +148,7 @@ fn every_mapper_and_every_order_has_a_golden() {
         assert!(all.iter().any(has), "no golden is drawn by {name}");
     }
     for (name, order, _) in Order::ALL {
-        let drawn = |golden: &Golden| golden.options.order.map_or(Order::default(), |set| set.0);
+        let drawn = |golden: &Golden| golden.options.order.unwrap_or_default();
         assert!(
             all.iter().any(|golden| drawn(golden) == order),
             "no golden is drawn in the order {name}"

@@ -468,12 +468,12 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
         (
             &["--texture", "thing.png"],
             2,
-            "--texture needs your own model: add --model FILE.obj",
+            "--texture needs a model; add --model FILE.obj",
         ),
         (
             &["--scene", "model"],
             2,
-            "--scene model needs your own model: add --model FILE.obj",
+            "--scene model needs a model; add --model FILE.obj",
         ),
     ] {
         let (ended, words, _) = emulate(path, arguments);

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use system::quote::printable;
 
-/// Standard output. A closed reader is no error; a full disk is.
+/// Standard output. A full disk is an error; a closed pipe is not.
 pub struct Output;
 
 impl Output {
@@ -15,7 +15,7 @@ impl Output {
             // The caller tries again.
             io::ErrorKind::Interrupted => Err(error),
             kind => {
-                let message = format!("standard output cannot be written: {error}");
+                let message = format!("cannot write to standard output: {error}");
                 Err(io::Error::new(kind, message))
             }
         })

@@ -548,41 +548,11 @@ impl fmt::Display for HeaderDifference {
 
 #[cfg(test)]
 mod tests {
-    use protocol::dump::Header;
-    use protocol::{FrameName, Word};
-
     use super::*;
-
-    /// Returns a palette of 256 different colours.
-    fn palette() -> modex::Palette {
-        std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8])
-    }
-
-    fn dump(content: Content) -> Dump {
-        let pixels = match content {
-            Content::Page => 320 * 240,
-            Content::Memory => 4 * PLANE_BYTES,
-        };
-        Dump {
-            header: Header {
-                content,
-                scene: "ball".into(),
-                model_file: None,
-                mapper: Word::new("exact"),
-                frame: Some(FrameName::Number(480)),
-                motion: None,
-                start: 0x4B00,
-                width: 320,
-                height: 240,
-            },
-            palette: palette(),
-            pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
-        }
-    }
 
     /// Returns the result of [`compare`] for a dump and a copy that `change` has modified, as text.
     fn described(content: Content, change: impl FnOnce(&mut Dump)) -> String {
-        let expected = dump(content);
+        let expected = Dump::example(content);
         let mut got = expected.clone();
         change(&mut got);
         let [expected, got] = [expected, got].map(Capture::Dump);
@@ -683,7 +653,7 @@ mod tests {
 
     #[test]
     fn dumps_of_other_content_or_size_are_not_compared() {
-        let content = described(Content::Page, |got| *got = dump(Content::Memory));
+        let content = described(Content::Page, |got| *got = Dump::example(Content::Memory));
         assert_eq!(
             content,
             "error: expected is a dump of a page, got a dump of all memory; take both with --all or both \
@@ -699,7 +669,7 @@ mod tests {
     #[test]
     fn a_dump_is_compared_with_a_frame_as_a_frame() {
         for content in [Content::Page, Content::Memory] {
-            let dump = dump(content);
+            let dump = Dump::example(content);
             let mut frame = dump.frame();
             let dump = Capture::Dump(dump);
             let same = Capture::Png(frame.clone());
@@ -723,7 +693,7 @@ mod tests {
 
     #[test]
     fn palettes_may_differ_but_not_hold_the_same_colours_in_another_order() {
-        let frame = dump(Content::Page).frame();
+        let frame = Dump::example(Content::Page).frame();
         let with = |change: &dyn Fn(&mut Vec<Rgb6>)| {
             let mut other = frame.clone();
             change(&mut other.palette);

@@ -49,6 +49,30 @@ impl fmt::Display for DumpError {
 impl std::error::Error for DumpError {}
 
 impl Dump {
+    /// Returns a dump of an artificial frame: an example for tests and documentation. All colours differ, and
+    /// equal pixels are far apart.
+    pub fn example(content: Content) -> Self {
+        let pixels = match content {
+            Content::Page => modex::WIDTH * modex::HEIGHT,
+            Content::Memory => 4 * PLANE_BYTES,
+        };
+        Self {
+            header: Header {
+                content,
+                scene: "ball".into(),
+                model_file: None,
+                mapper: Word::new("exact"),
+                frame: Some(FrameName::Number(480)),
+                motion: None,
+                start: 0x4B00,
+                width: modex::WIDTH as u16,
+                height: modex::HEIGHT as u16,
+            },
+            palette: std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8]),
+            pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
+        }
+    }
+
     /// Reads a dump from a file's bytes: lines with their checksums, ended by LF or CR LF.
     ///
     /// # Errors
@@ -403,26 +427,14 @@ mod tests {
     use super::*;
 
     fn dump() -> Dump {
-        Dump {
-            header: Header {
-                content: Content::Page,
-                scene: "cube".into(),
-                model_file: None,
-                mapper: Word::new("exact"),
-                frame: Some(FrameName::Number(7)),
-                motion: Some(Motion {
-                    yaw: 1,
-                    pitch: u32::MAX,
-                    roll: 0,
-                    distance: 0xFFFF_0000,
-                }),
-                start: 0,
-                width: 320,
-                height: 240,
-            },
-            palette: [[1, 2, 3]; 256],
-            pixels: vec![7; 320 * 240],
-        }
+        let mut dump = Dump::example(Content::Page);
+        dump.header.motion = Some(Motion {
+            yaw: 1,
+            pitch: u32::MAX,
+            roll: 0,
+            distance: 0xFFFF_0000,
+        });
+        dump
     }
 
     /// Returns the lines with a new last line that matches the lines before it.
@@ -443,7 +455,7 @@ mod tests {
             dump.lines()[4..7],
             [
                 "mapper exact",
-                "frame 7",
+                "frame 480",
                 "motion 00000001 ffffffff 00000000 ffff0000"
             ]
         );

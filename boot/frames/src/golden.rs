@@ -43,7 +43,7 @@ use texmap::{Mapper, Order};
 use crate::backend::{self, Backend, EmulatedDemo};
 use crate::difference::{Capture, Difference, compare};
 use crate::indexed::IndexedImage;
-use crate::options::{FrameOptions, NamedValue};
+use crate::options::FrameOptions;
 use crate::report::Report;
 use crate::rgb::RgbImage;
 use system::Step;
@@ -137,13 +137,12 @@ impl Golden {
                 .with_context(wrong);
         }
         let options = FrameOptions {
-            scene: known("scene", description.scene, Entry::parse)
-                .with_context(wrong)?
-                .map(|entry| NamedValue(entry.name)),
+            scene: known("scene", description.scene, |name| {
+                Entry::parse(name).map(|entry| entry.name)
+            })
+            .with_context(wrong)?,
             mapper: known("mapper", description.mapper, Mapper::parse).with_context(wrong)?,
-            order: known("order", description.order, Order::parse)
-                .with_context(wrong)?
-                .map(NamedValue),
+            order: known("order", description.order, Order::parse).with_context(wrong)?,
         };
         Ok(Self {
             options,

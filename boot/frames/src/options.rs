@@ -1,11 +1,10 @@
-//! The options that decide how frames are drawn: scene, mapper and order, chosen by name.
+//! The options that determine how frames are drawn: scene, mapper and order, each chosen by name.
 
 use std::ffi::OsStr;
 use std::fmt::Display;
-use std::sync::LazyLock;
 
+use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
 use protocol::{Command, Setting, Word};
 use scene::catalogue::{CATALOGUE, Entry};
 use texmap::{Mapper, Order};
@@ -13,17 +12,17 @@ use texmap::{Mapper, Order};
 /// Scene, mapper and order. `None` leaves the choice to the demo.
 #[derive(Args, Clone, Copy, Debug, Default)]
 pub struct FrameOptions {
-    /// Which scene to show [default: ball, or your own model]
-    #[arg(long, global = true, value_name = "NAME")]
-    pub scene: Option<NamedValue<&'static str>>,
+    /// The scene to show [default: ball, or your own model]
+    #[arg(long, global = true, value_name = "NAME", value_parser = scenes())]
+    pub scene: Option<&'static str>,
     /// The mapper, which finds the texel of each pixel.
     #[arg(long, global = true, value_name = "NAME", value_parser = Mappers,
-        help = with_default("How textures are mapped", Mapper::default()))]
+        help = with_default("The mapper, which finds the texel of each pixel", Mapper::default()))]
     pub mapper: Option<Mapper>,
     /// The order in which the columns of a frame are drawn, and the destination.
-    #[arg(long, global = true, value_name = "NAME",
-        help = with_default("In which order the columns of a frame are drawn, and where to", name_of(Order::default())))]
-    pub order: Option<NamedValue<Order>>,
+    #[arg(long, global = true, value_name = "NAME", value_parser = orders(),
+        help = with_default("The order in which the columns of a frame are drawn", Order::default()))]
+    pub order: Option<Order>,
 }
 
 /// Returns a help text with the default, in clap's notation.
@@ -31,26 +30,37 @@ fn with_default(help: &str, default: impl Display) -> String {
     format!("{help} [default: {default}]")
 }
 
-/// Returns an order's name on the command line.
-fn name_of(order: Order) -> &'static str {
-    let named = Order::ALL.into_iter().find(|(_, other, _)| *other == order);
-    named.map_or("", |(name, ..)| name)
-}
-
 impl FrameOptions {
     /// Returns the commands that set these options; they follow [`Command::Hold`].
     pub fn commands(&self) -> impl Iterator<Item = Command> {
         let set = |setting, name: &dyn Display| Some(Command::Set(setting, Some(Word::of(name)?)));
-        let scene = self.scene.and_then(|s| set(Setting::Scene, &s.0));
-        let mapper = self.mapper.and_then(|m| set(Setting::Mapper, &m));
-        let order = self.order.and_then(|o| set(Setting::Order, &o.0));
+        let scene = self.scene.and_then(|scene| set(Setting::Scene, &scene));
+        let mapper = self.mapper.and_then(|mapper| set(Setting::Mapper, &mapper));
+        let order = self.order.and_then(|order| set(Setting::Order, &order));
         scene.into_iter().chain(mapper).chain(order)
     }
 }
 
-/// A value that has a name on the command line.
-#[derive(Clone, Copy, Debug)]
-pub struct NamedValue<T>(pub T);
+/// Returns the name of a built-in scene, or of the user's own model.
+pub(crate) fn scene_named(name: &str) -> Option<&'static str> {
+    let built_in = CATALOGUE.iter().map(|entry| entry.name);
+    built_in.chain([Entry::LOADED]).find(|known| *known == name)
+}
+
+/// Returns a parser of scenes' names; the user's own model is last.
+fn scenes() -> impl TypedValueParser<Value = &'static str> {
+    let built_in = CATALOGUE.iter().map(|entry| (entry.name, entry.about));
+    let all = built_in.chain([(Entry::LOADED, "your own model, from --model")]);
+    PossibleValuesParser::new(all.map(|(name, about)| PossibleValue::new(name).help(about)))
+        .map(|name| scene_named(&name).expect("the parser accepts listed names only"))
+}
+
+/// Returns a parser of orders' names.
+fn orders() -> impl TypedValueParser<Value = Order> {
+    let all = Order::ALL.map(|(name, _, about)| PossibleValue::new(name).help(about));
+    PossibleValuesParser::new(all)
+        .map(|name| Order::parse(&name).expect("the parser accepts listed names only"))
+}
 
 /// Parses a mapper's name: a listed name, or a mapper within any tolerance.
 #[derive(Clone)]
@@ -82,63 +92,25 @@ impl TypedValueParser for Mappers {
     }
 }
 
-/// The names of all scenes; the user's own model is last.
-static SCENES: LazyLock<Vec<NamedValue<&'static str>>> = LazyLock::new(|| {
-    let built_in = CATALOGUE.iter().map(|entry| entry.name);
-    built_in.chain([Entry::LOADED]).map(NamedValue).collect()
-});
-
-impl ValueEnum for NamedValue<&'static str> {
-    fn value_variants<'a>() -> &'a [Self] {
-        &SCENES
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let about = Entry::parse(self.0).map_or("your own --model", |entry| entry.about);
-        Some(PossibleValue::new(self.0).help(about))
-    }
-}
-
-impl ValueEnum for NamedValue<Order> {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[
-            NamedValue(Order::Polygons),
-            NamedValue(Order::Planes),
-            NamedValue(Order::Buffer),
-        ]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, _, about) = Order::ALL
-            .into_iter()
-            .find(|(_, order, _)| *order == self.0)?;
-        Some(PossibleValue::new(name).help(about))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn every_name_is_a_value_and_a_word_on_the_line() {
+    fn every_name_is_parsed_and_is_a_word_of_the_protocol() {
         for &(name, mapper, _) in Mapper::ALL {
             assert_eq!(Mapper::parse(name), Some(mapper));
             assert_eq!(mapper.to_string(), name);
             assert!(Word::new(name).is_some(), "{name}");
         }
-        for entry in &CATALOGUE {
-            assert!(Word::new(entry.name).is_some(), "{}", entry.name);
+        for name in CATALOGUE.iter().map(|entry| entry.name) {
+            assert_eq!(scene_named(name), Some(name));
+            assert!(Word::new(name).is_some(), "{name}");
         }
-        assert_eq!(
-            NamedValue::<Order>::value_variants().len(),
-            Order::ALL.len()
-        );
-        for (named, (name, order, _)) in
-            NamedValue::<Order>::value_variants().iter().zip(Order::ALL)
-        {
-            assert_eq!(named.0, order);
+        for (name, order, _) in Order::ALL {
             assert_eq!(Order::parse(name), Some(order));
+            assert_eq!(order.to_string(), name);
+            assert!(Word::new(name).is_some(), "{name}");
         }
     }
 }

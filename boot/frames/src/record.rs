@@ -24,7 +24,7 @@ use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
-/// Which frames to record, and where to.
+/// The options of `record`: the frames, and the file or folder.
 #[derive(Args, Clone, Debug)]
 pub struct RecordOptions {
     /// Frames A up to B, excluding B (A..=B includes B); the ball turns once in 720 frames

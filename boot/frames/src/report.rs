@@ -21,13 +21,12 @@ use crate::difference::{
     Bounds, Capture, Difference, HexColour, PixelLayout, colour, differing_entries,
 };
 use crate::dump::Dump;
+use crate::html::{self, escape};
 use crate::indexed::IndexedImage;
 use crate::rgb::RgbImage;
 use system::write_atomically;
 use vga::widen;
 
-/// The style sheet of every page that this project writes.
-pub const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
 
 /// The scale at which frames are shown if the window is wide enough.
@@ -155,18 +154,17 @@ impl Report {
 
     /// Returns the start of the page, up to the first pair.
     fn head(&self) -> String {
-        let title = escape(&self.title());
+        let title = self.title();
         let verdict = match (self.different.len(), self.incomparable.len()) {
             (0, 0) => "equal",
             _ => "different",
         };
-        let mut page = format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <title>{title} - Crystal Ball</title>\n<style>\n{STYLE}</style>\n</head>\n\
-             <body id=\"top\">\n<header class=\"top {verdict}\">\n\
-             <p class=\"brand\">Crystal Ball <span>diff</span></p>\n<h1>{title}</h1>\n"
+        let mut page = html::head(&title, "");
+        let _ = write!(
+            page,
+            "<body id=\"top\">\n<header class=\"top {verdict}\">\n\
+             <p class=\"brand\">Crystal Ball <span>diff</span></p>\n<h1>{}</h1>\n",
+            escape(&title)
         );
         if let Some(between) = &self.between {
             let [expected, got] = between.each_ref().map(|path| escape(path));
@@ -648,25 +646,9 @@ impl UniqueNames {
 
 fn percent(count: usize, of: usize) -> String {
     match 100.0 * count as f64 / of as f64 {
-        share if share < 0.01 => "&lt; 0.01 %".into(),
+        share if share < 0.01 => escape("< 0.01 %"),
         share => format!("{share:.2} %"),
     }
-}
-
-/// Escapes text for HTML, including an attribute's quotes.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '>' => escaped += "&gt;",
-            '"' => escaped += "&quot;",
-            '\'' => escaped += "&#39;",
-            c => escaped.push(c),
-        }
-    }
-    escaped
 }
 
 /// Returns a file name as part of a relative URL.
@@ -688,6 +670,7 @@ fn url(name: &OsStr) -> String {
 mod tests {
     use super::*;
     use crate::difference::compare;
+    use crate::html::STYLE;
 
     fn frame(pixels: &[u8]) -> IndexedImage {
         IndexedImage {

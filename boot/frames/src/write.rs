@@ -190,7 +190,6 @@ mod tests {
     use super::*;
     use crate::backend::{self, EmulatedDemo};
     use crate::dump::Dump;
-    use crate::options::NamedValue;
 
     /// Takes the motion of a frame in reduced quality from its header, and draws the same bytes again.
     #[test]
@@ -221,7 +220,7 @@ mod tests {
             out: folder.path().into(),
         };
         let options = FrameOptions {
-            scene: Some(NamedValue("cube")),
+            scene: Some("cube"),
             mapper: Mapper::parse("exact"),
             order: None,
         };

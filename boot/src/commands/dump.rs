@@ -1,4 +1,4 @@
-//! `dump`: frames from QEMU's card.
+//! `dump`: writes frames from QEMU's VGA.
 
 use frames::write::DumpOptions;
 
@@ -10,7 +10,7 @@ pub const HELP: &str = "\
 Examples:
   cargo run -- dump --frames 0..10 --out a                   ten frames of the ball
   cargo run -- dump --frame 480 --scene knot --mapper exact  a frame of the knot, into dumps/
-  cargo run -- dump --frame 0 --all --out all                all of video memory
+  cargo run -- dump --frame 0 --all --out all                all of video memory, not only the page
   cargo run -- --vga cirrus dump --frames 0..10 --out b      from another display adapter
   cargo run -- dump --frame 0 --model thing.obj --texture thing.png
                                                              your own model";

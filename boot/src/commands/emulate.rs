@@ -1,4 +1,4 @@
-//! `emulate`: frames from the emulated VGA.
+//! `emulate`: writes frames from the emulated VGA.
 
 use frames::backend::{self, EmulatedDemo};
 use frames::write::DumpOptions;
@@ -10,11 +10,11 @@ use crate::output::print_path;
 /// Examples for the help.
 pub const HELP: &str = "\
 Examples:
-  cargo run -- emulate --frames 0..10 --out b                  the files of `dump`
+  cargo run -- emulate --frames 0..10 --out b                  the same files as `dump` with --out b
   cargo run -- emulate --frame 0 --frame 480 --mapper affine   two frames, into dumps/
   cargo run -- emulate --pose 40000000 0 0 50000 --scene cube  a pose of your choice
   cargo run -- emulate --frame 8 --mapper exact --motion ffa4fa50 0 0 0
-                                                               in reduced quality";
+                                                               a frame in reduced quality";
 
 /// Writes a dump and a PNG of each frame.
 pub fn run(common: &Common, frames: &DumpOptions) -> anyhow::Result<()> {

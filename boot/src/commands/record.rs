@@ -1,4 +1,4 @@
-//! `record`: an animation.
+//! `record`: writes an animation.
 
 use std::process::ExitCode;
 
@@ -17,7 +17,7 @@ Examples:
   cargo run -- record --scene knot --every 6 --out knot.gif     ten frames a second
   cargo run -- record --frames 0..60 --every 1 --out frames     every frame of a second, as PNGs";
 
-/// Boots, and records what QEMU's card holds. Wrong options give exit code 2.
+/// Boots, and records what QEMU's VGA holds. Wrong options give exit code 2.
 pub fn run(mut common: Common, options: &RecordOptions) -> anyhow::Result<ExitCode> {
     if let Err(error) = options.check() {
         say(format_args!("error: {error}"));

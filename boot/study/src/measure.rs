@@ -251,7 +251,8 @@ pub struct SpanCost {
 pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
     ensure!(
         (1..=MAX_ROUNDS).contains(&config.rounds),
-        "rounds are 1 to {MAX_ROUNDS}"
+        "{} rounds; the limits are 1 to {MAX_ROUNDS}",
+        config.rounds
     );
     let ready = setup::ready_to_measure(&config.options)?;
     let mut memories = BenchMemories::default();
@@ -265,15 +266,15 @@ pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
         let mut counting = Guest::boot(&ready, cpu, &["-icount", "shift=0"])?;
         let a_tick = counting.ticks_an_instruction()?;
         let mut counted = Vec::new();
-        for (mapper, order) in asked(config) {
+        for (mapper, order) in combinations(config) {
             counted.push(counting.measure(mapper, order, 2, config.spans)?);
             tick();
         }
         counting.machine.leave()?;
         let mut timing = Guest::boot(&ready, cpu, &[])?;
         let mut rows = Vec::new();
-        for ((mapper, order), counted) in asked(config).zip(counted) {
-            emulated.compare(mapper, order, &timing.ask(Ask::Check(mapper, order))?)?;
+        for ((mapper, order), counted) in combinations(config).zip(counted) {
+            emulated.compare(mapper, order, &timing.send(Ask::Check(mapper, order))?)?;
             let timed = timing.measure(mapper, order, config.rounds, config.spans)?;
             tick();
             rows.push(KernelRow {
@@ -295,7 +296,7 @@ pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
 }
 
 /// Returns the mappers and orders to measure.
-fn asked(config: &MeasureConfig) -> impl Iterator<Item = (Mapper, Order)> {
+fn combinations(config: &MeasureConfig) -> impl Iterator<Item = (Mapper, Order)> {
     let mappers = config.mappers.iter();
     mappers.flat_map(|&mapper| Order::ALL.map(|(_, order, _)| (mapper, order)))
 }
@@ -318,14 +319,14 @@ impl Guest {
     }
 
     /// Sends a request, and returns the lines of the answer without its last line.
-    fn ask(&mut self, ask: Ask) -> anyhow::Result<Vec<String>> {
-        let ask = ask.to_string();
-        self.machine.send_line(&ask)?;
-        let mut answer = self.machine.answer(&ask)?;
+    fn send(&mut self, request: Ask) -> anyhow::Result<Vec<String>> {
+        let request = request.to_string();
+        self.machine.send_line(&request)?;
+        let mut answer = self.machine.answer(&request)?;
         match answer.pop() {
-            Some(last) if last == format!("{OK} {ask}") => Ok(answer),
+            Some(last) if last == format!("{OK} {request}") => Ok(answer),
             last => bail!(
-                "the measuring kernel answered '{ask}' with '{}'",
+                "the benchmark kernel refused '{request}': {}",
                 last.unwrap_or_default()
             ),
         }
@@ -336,27 +337,30 @@ impl Guest {
     /// # Errors
     /// If the clock does not count instructions.
     fn ticks_an_instruction(&mut self) -> anyhow::Result<u64> {
-        let answer = self.ask(Ask::Calibrate)?;
+        let answer = self.send(Ask::Calibrate)?;
         let words: Vec<&str> = answer
             .first()
             .map_or("", String::as_str)
             .split(' ')
             .collect();
         let ["instructions", instructions, "ticks", ticks] = words[..] else {
-            bail!("the measuring kernel calibrates with {answer:?}");
+            bail!(
+                "the benchmark kernel answered '{}' with {answer:?}; expected 'instructions N ticks N'",
+                Ask::Calibrate
+            );
         };
         let (instructions, ticks): (u64, u64) = (instructions.parse()?, ticks.parse()?);
         let each = ticks.checked_div(instructions).unwrap_or(0);
         ensure!(
             each > 0 && each * instructions == ticks,
-            "under -icount QEMU's time stamp counter should count instructions, and it counts \
-             {ticks} ticks for {instructions} of them"
+            "under -icount QEMU's time stamp counter must count instructions, but it counted {ticks} \
+             ticks for {instructions} instructions"
         );
         Ok(each)
     }
 
     fn has_bmi2(&mut self) -> anyhow::Result<bool> {
-        let answer = self.ask(Ask::Calibrate)?;
+        let answer = self.send(Ask::Calibrate)?;
         Ok(answer.iter().any(|line| line == "bmi2 yes"))
     }
 
@@ -375,14 +379,14 @@ impl Guest {
     }
 
     /// Requests figures, and returns them by name.
-    fn figures(&mut self, ask: Ask) -> anyhow::Result<BTreeMap<String, Figure>> {
-        let answer = self.ask(ask)?;
+    fn figures(&mut self, request: Ask) -> anyhow::Result<BTreeMap<String, Figure>> {
+        let answer = self.send(request)?;
         let figures = answer.iter().map(|line| {
             let mut words = line.split(' ');
             let name = words.next().unwrap_or_default().to_string();
             let figure = Figure::parse(words);
             figure.map(|figure| (name, figure)).with_context(|| {
-                format!("the measuring kernel answered '{ask}' with '{line}', which is no figure")
+                format!("the benchmark kernel answered '{request}' with '{line}'; expected figures")
             })
         });
         figures.collect()
@@ -405,26 +409,27 @@ impl Reported {
     fn span_costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<Vec<SpanCost>> {
         let name = |length| format!("run-{length}-jobs");
         let lengths = LENGTHS.into_iter();
-        let told = lengths.filter(|&length| self.figures.contains_key(&name(length)));
-        told.map(|length| {
-            Ok(SpanCost {
-                length,
-                jobs: self.cost(&name(length), timed, a_tick)?,
-                draw: self.cost(&format!("run-{length}-draw"), timed, a_tick)?,
+        let reported = lengths.filter(|&length| self.figures.contains_key(&name(length)));
+        reported
+            .map(|length| {
+                Ok(SpanCost {
+                    length,
+                    jobs: self.cost(&name(length), timed, a_tick)?,
+                    draw: self.cost(&format!("run-{length}-draw"), timed, a_tick)?,
+                })
             })
-        })
-        .collect()
+            .collect()
     }
 
     fn cost(&self, name: &str, timed: &Self, a_tick: u64) -> anyhow::Result<WorkCost> {
-        let figure = |told: &Self| {
-            let figure = told.figures.get(name).copied();
-            figure.with_context(|| format!("the measuring kernel told nothing of '{name}'"))
+        let figure = |reported: &Self| {
+            let figure = reported.figures.get(name).copied();
+            figure.with_context(|| format!("'{name}': the benchmark kernel reported no figure"))
         };
         let (counted, timed) = (figure(self)?, figure(timed)?);
         ensure!(
             counted.pixels() == timed.pixels(),
-            "'{name}' drew {} pixels under -icount and {} without",
+            "'{name}': {} pixels under -icount, {} without; both must draw the same",
             counted.pixels(),
             timed.pixels()
         );
@@ -441,8 +446,8 @@ fn repeated(name: &str, figure: &Figure, a_tick: u64) -> anyhow::Result<u64> {
     let ticks = figure.ticks();
     ensure!(
         ticks.iter().all(|other| other == &ticks[0]) && ticks[0].is_multiple_of(a_tick),
-        "under -icount '{name}' took {ticks:?} ticks of {a_tick} for an instruction: \
-         it does not repeat"
+        "'{name}': rounds under -icount must have equal ticks, a multiple of {a_tick}; they have \
+         {ticks:?}"
     );
     Ok(ticks[0] / a_tick)
 }
@@ -457,14 +462,14 @@ mod tests {
         figure
     }
 
-    fn told(name: &str, figure: Figure) -> Reported {
+    fn reported(name: &str, figure: Figure) -> Reported {
         Reported {
             figures: BTreeMap::from([(name.to_string(), figure)]),
         }
     }
 
     #[test]
-    fn ratios_are_of_the_same_round_and_a_pixel_each() {
+    fn a_ratio_compares_times_a_pixel_of_the_same_round() {
         let cost = |pixels, ticks: &[u64]| WorkCost {
             pixels,
             instructions: 0,
@@ -482,20 +487,20 @@ mod tests {
     }
 
     #[test]
-    fn figures_that_do_not_repeat_are_an_error() {
-        let timed = told("screen-ram", figure(7, &[100, 90]));
-        let cost = |counted| told("screen-ram", counted).cost("screen-ram", &timed, 2);
+    fn instructions_that_differ_between_rounds_are_an_error() {
+        let timed = reported("screen-ram", figure(7, &[100, 90]));
+        let cost = |counted| reported("screen-ram", counted).cost("screen-ram", &timed, 2);
         let good = cost(figure(7, &[60, 60])).unwrap();
         assert_eq!((good.instructions, good.ticks), (30, vec![100, 90]));
         for (bad, why) in [
-            (figure(7, &[60, 62]), "does not repeat"),
-            (figure(7, &[61, 61]), "does not repeat"),
-            (figure(8, &[60, 60]), "drew 8 pixels under -icount and 7"),
+            (figure(7, &[60, 62]), "must have equal ticks"),
+            (figure(7, &[61, 61]), "must have equal ticks"),
+            (figure(8, &[60, 60]), "8 pixels under -icount, 7 without"),
         ] {
             let error = cost(bad).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
-        let missing = told("bare-ram", figure(7, &[60])).cost("screen-ram", &timed, 2);
+        let missing = reported("bare-ram", figure(7, &[60])).cost("screen-ram", &timed, 2);
         assert!(missing.is_err());
     }
 }

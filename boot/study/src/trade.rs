@@ -80,22 +80,22 @@ const BY_LENGTH: [&str; 8] = [
     "exact",
 ];
 
-/// The options of the measurement, and the folder for its results.
+/// The options of `trade`: what to measure, and the folder for the results.
 #[derive(Clone, Debug, clap::Args)]
 pub struct TradeOptions {
-    /// The folder for the results [default: target/crystal-ball/trade of the workspace]
+    /// The folder for the results [default: target/crystal-ball/trade in the workspace]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Measure only these scenes, separated by commas; `--scene` names one
+    /// Measure only these scenes, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(workload::names()))]
     pub scenes: Vec<String>,
-    /// Measure only these mappers, separated by commas; `--mapper` names one
+    /// Measure only these mappers, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(mapper_names()))]
     pub mappers: Vec<String>,
-    /// Measure quickly, a twentieth of the time for each value: for a first look, not for reliable times
+    /// Spend a twentieth of the time on each value: enough for a first look, not for reliable times
     #[arg(long)]
     quick: bool,
-    /// Leave out the kernel's costs under QEMU
+    /// Measure on the host only, without the kernel's costs under QEMU
     #[arg(long)]
     host_only: bool,
     /// The seed of the random polygons
@@ -114,7 +114,7 @@ fn mapper_names() -> impl Iterator<Item = &'static str> {
 pub fn check_build() -> anyhow::Result<()> {
     ensure!(
         !cfg!(debug_assertions),
-        "a debug build measures its own checks: use `cargo run --release -- trade`"
+        "a debug build's times include its checks; use `cargo run --release -- trade`"
     );
     Ok(())
 }
@@ -151,8 +151,8 @@ pub fn run(
         false => Effort::FULL,
     };
     fs::create_dir_all(out.join("images"))
-        .with_context(|| format!("{} cannot be made", out.display()))?;
-    // The kernel comes first, so that a missing part of its set-up is reported at once.
+        .with_context(|| format!("{}: the folder cannot be created", out.display()))?;
+    // The kernel comes first, so that a missing part of the set-up is reported at once.
     let measured = match options.host_only {
         true => None,
         false => Some(measure::run(&measure::MeasureConfig {
@@ -178,20 +178,20 @@ fn about(options: &TradeOptions, mappers: &[Mapper]) -> Vec<String> {
     let mut about = vec![
         format!("On {}.", clock::cpu()),
         format!(
-            "Errors in texels, against the exact quotient at the pixel's centre. Costs in {unit} \
-             a pixel, median of {ROUNDS} rounds ± half their spread, drawn into RAM; in brackets \
-             as a ratio to a bare load and store a pixel in the same order. \"To packed\": to \
-             `packed` by polygons."
+            "Errors are in texels, from the exact quotient at the pixel's centre. Costs are in {unit} \
+             a pixel, drawn into RAM: the median of {ROUNDS} rounds ± half the distance from least \
+             to most. In brackets: the ratio to a bare load and store a pixel in the same order. \"To \
+             packed\": the ratio to `packed` by polygons."
         ),
     ];
     if options.quick {
-        about.push("A quick run: its times are to look at, not to rely on.".into());
+        about.push("This was a quick run: its times are a first look, not reliable.".into());
     }
     let extract = Mapper::Affine(Loop::Extract);
     if mappers.contains(&extract) {
         about.push(match cost::beyond_baseline(extract) {
-            Some(_) => "`extract` needs BMI2: \"without\" is its portable twin.".into(),
-            None => "This CPU has no BMI2: `extract` is its portable twin.".into(),
+            Some(_) => "`extract` needs BMI2; \"without\" is its portable reference.".into(),
+            None => "This CPU has no BMI2, so `extract` is its portable reference here.".into(),
         });
     }
     about
@@ -223,7 +223,7 @@ fn measure(
     let mut column = None;
     let mut step = Step::counting("measuring scenes", scenes.len() as u64);
     for (done, name) in (1..).zip(scenes) {
-        let look = |workload: &Workload<'_>| {
+        let add = |workload: &Workload<'_>| {
             let number = TIMED.min(workload.frames.len() - 1);
             let mut costs = cost::measure(workload, number, mappers, effort).into_iter();
             let rows = mappers.iter().map(|&mapper| TableRow {
@@ -245,13 +245,13 @@ fn measure(
             });
         };
         match model.filter(|entry| entry.name == *name) {
-            Some(entry) => workload::with_entry(entry, look),
-            None => workload::with(name, seed, look),
+            Some(entry) => workload::with_entry(entry, add),
+            None => workload::with(name, seed, add),
         }
         step.at(done);
     }
     drop(step);
-    let mut step = Step::counting("sweeping run lengths and angles", SWEEPS as u64);
+    let mut step = Step::counting("sweeping span lengths and angles", SWEEPS as u64);
     let mut done = 0;
     let (sweep, unrolling) = workload::with("tilted", seed, |workload| {
         let sweep = cost::sweep(workload, mappers, effort, || {
@@ -327,15 +327,15 @@ impl Results {
         let claims = claims::cells(&claims);
 
         let mut extra = vec![(
-            String::from("aims"),
-            "What was aimed at, and what this run measured.".to_string(),
+            String::from("targets"),
+            "The project's targets, and the values that this run measured.".to_string(),
             kernel::targets(&self.tables, &self.sweep, self.kernel.as_ref()),
         )];
         if let Some(measured) = &self.kernel {
             let about = format!(
-                "In QEMU {}: instructions under `-icount shift=0`, exact; writes and reads of a \
-                 frame of the ball, exact; times of its whole frame under plain TCG, medians of \
-                 five rounds (least to most).",
+                "In QEMU {}. Instructions are counted under `-icount shift=0`, and accesses of a frame \
+                 of the ball on the emulated VGA; both are exact. Times of the whole frame are \
+                 measured under plain TCG: the median of the rounds (least to most).",
                 measured.qemu
             );
             extra.push(("the kernel".into(), about, kernel::cells(measured)));
@@ -411,7 +411,7 @@ impl Results {
             let svg = plot::error_against_cost(
                 [
                     &format!("Error against cost: {}", table.scene),
-                    "whole frames in RAM, in the cheaper of both orders",
+                    "whole frames in RAM, in the cheaper of the two orders",
                 ],
                 [
                     &format!("{unit} a pixel"),
@@ -419,16 +419,16 @@ impl Results {
                 ],
                 &points,
             )?;
-            let caption = "99 of 100 pixels err by less than the height says. The exact mapper is \
-                           off by the last bit of a 16.16 coordinate, which is how coordinates are \
-                           told; its texels are exact.";
+            let caption = "99 of 100 pixels have an error of at most the point's height. Coordinates \
+                           are 16.16 fixed point, so the exact mapper's error is at most the last \
+                           bit; its texels are exact.";
             plots.push((file, caption.into(), svg));
         }
         if let Some((column, lines)) = &self.column {
             plots.push((
                 "error-column.svg",
-                "Each mapper touches the truth where it divides, and strays between. Below 1/65536 \
-                 texel coordinates are not told apart."
+                "Each mapper is exact where it divides, and deviates between. Errors below 1/65536 \
+                 texel are drawn at 1/65536, the last bit of a coordinate."
                     .into(),
                 plot::lines(
                     [
@@ -463,18 +463,18 @@ impl Results {
         if !by_length.is_empty() {
             plots.push((
                 "cost-length.svg",
-                "What a column costs before its first pixel shows in short runs. Rows are as wide \
-                 as the screen whatever the column's height."
+                "Short spans show what a column costs before its first pixel. The mappers of rows draw \
+                 rows as wide as the screen, at any span length."
                     .into(),
                 plot::lines(
                     [
-                        "Cost against run length",
+                        "Cost against span length",
                         &format!(
                             "drawing alone, plane by plane, the texture at {} degrees",
                             cost::ANGLE
                         ),
                     ],
-                    ["pixels in a column's run", &format!("{unit} a pixel")],
+                    ["pixels in a column's span", &format!("{unit} a pixel")],
                     0.01,
                     true,
                     &by_length,
@@ -497,7 +497,7 @@ mod tests {
 
     /// Measures and writes everything, with as little work as possible.
     #[test]
-    fn everything_is_written() {
+    fn a_run_writes_every_file() {
         let out = tempfile::tempdir().unwrap();
         let mappers = ["affine", "packed", "linear-16", "exact"];
         let mappers = mappers.map(|name| Mapper::parse(name).unwrap());
@@ -519,7 +519,7 @@ mod tests {
             "## tilted",
             "## wall",
             "## model",
-            "## aims",
+            "## targets",
             "## The sources' claims, measured",
         ] {
             assert!(md.contains(part), "{part}");
@@ -529,7 +529,7 @@ mod tests {
             let svg = read(name);
             assert!(html.contains(svg.trim()), "{name}");
         }
-        // Every image that the page names exists.
+        // Each image that the page names exists.
         let named = html.split('"').filter(|part| part.starts_with("images/"));
         let mut count = 0;
         for name in named {

@@ -55,11 +55,11 @@ const NO_CLOCK: Clock = Clock {
 impl<'a> EmulatedBenches<'a> {
     /// Returns benches whose emulated VGAs are in the state after the mode set.
     pub fn new(memories: &'a mut BenchMemories) -> Self {
-        let taken = "the emulated card takes Mode X";
+        let accepted = "the emulated VGA accepts the mode set";
         let counted = Counted::new(Vga::new());
         Self {
-            counted: Bench::new(&mut memories.counted, counted).expect(taken),
-            plain: Bench::new(&mut memories.plain, Vga::new()).expect(taken),
+            counted: Bench::new(&mut memories.counted, counted).expect(accepted),
+            plain: Bench::new(&mut memories.plain, Vga::new()).expect(accepted),
         }
     }
 
@@ -82,11 +82,11 @@ impl<'a> EmulatedBenches<'a> {
         let (counts, again) = (one(), one());
         let faults = bench.bus().inner().take_faults();
         if let Some(fault) = faults.first() {
-            bail!("the emulated card finds an access at fault: {fault}");
+            bail!("{mapper} in the order {order}: the emulated VGA found a fault: {fault}");
         }
         ensure!(
             counts == again,
-            "the accesses of {mapper} in the order {order} do not repeat: {counts:?}, {again:?}"
+            "{mapper} in the order {order}: two frames have different accesses: {counts:?}, {again:?}"
         );
         let frames = u64::from(work.frames());
         let each = |tally: Tally| Tally {
@@ -116,7 +116,7 @@ impl<'a> EmulatedBenches<'a> {
         let mut faults = self.plain.bus().take_faults();
         faults.append(&mut self.counted.bus().inner().take_faults());
         if let Some(fault) = faults.first() {
-            bail!("the emulated card finds an access at fault: {fault}");
+            bail!("{mapper} in the order {order}: the emulated VGA found a fault: {fault}");
         }
         Ok([plain, counted])
     }
@@ -125,12 +125,17 @@ impl<'a> EmulatedBenches<'a> {
     ///
     /// # Errors
     /// A frame that differs.
-    pub fn compare(&mut self, mapper: Mapper, order: Order, told: &[String]) -> anyhow::Result<()> {
+    pub fn compare(
+        &mut self,
+        mapper: Mapper,
+        order: Order,
+        kernel: &[String],
+    ) -> anyhow::Result<()> {
         for emulated in self.checksums(mapper, order)? {
             ensure!(
-                told == emulated,
-                "{mapper} in the order {order} draws {told:?} in QEMU and {emulated:?} on the \
-                 emulated card"
+                kernel == emulated,
+                "{mapper} in the order {order}: QEMU's VGA has the checksums {kernel:?}, the emulated \
+                 VGA has {emulated:?}"
             );
         }
         Ok(())

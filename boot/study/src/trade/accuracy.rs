@@ -1,9 +1,9 @@
 //! The error of a mapper's coordinates, and the difference of its frame from the exact mapper's.
 //!
-//! The truth at a pixel is the quotient of the plane's integers at the pixel's centre, clamped into the
-//! texture. The error is the larger of |u' - u| and |v' - v|, in texels, where (u, v) is the truth and (u',
-//! v') is the mapper's coordinate. Mappers have 16.16 coordinates, so even the exact mapper's error is
-//! between 0 and 2^-16.
+//! The exact coordinate at a pixel is the quotient of the plane's integers at the pixel's centre, clamped
+//! into the texture. The error is the larger of |u' - u| and |v' - v|, in texels, where (u, v) is the exact
+//! coordinate and (u', v') is the mapper's. Mappers have 16.16 coordinates, so even the exact mapper's error
+//! is between 0 and 2^-16.
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use texmap::plane::{Plane, texel};
@@ -41,7 +41,7 @@ impl Accuracy {
     }
 }
 
-/// The truth at a pixel.
+/// The exact coordinate at a pixel.
 #[derive(Clone, Copy, Debug)]
 struct ExactCoordinate {
     /// The coordinates, in texels, from 0 to the texture's sides.
@@ -82,10 +82,10 @@ pub fn errors(
     let plane = face.plane();
     let dropped = mapper.jobs(&face, texture, |job| {
         job.pixels(texture, |(x, y), (u, v)| {
-            let truth = ExactCoordinate::new(&plane, texture, x, y);
-            let off = |at: i32, truth: f64| (f64::from(at) / 65_536.0 - truth).abs();
-            let error = off(u, truth.at.0).max(off(v, truth.at.1));
-            let other = ((u >> 16) as u16, (v >> 16) as u16) != truth.texel;
+            let exact = ExactCoordinate::new(&plane, texture, x, y);
+            let off = |at: i32, exact: f64| (f64::from(at) / 65_536.0 - exact).abs();
+            let error = off(u, exact.at.0).max(off(v, exact.at.1));
+            let other = ((u >> 16) as u16, (v >> 16) as u16) != exact.texel;
             sink((x, y), error, other);
         });
     });
@@ -141,7 +141,7 @@ mod tests {
     use crate::trade::workload::{RANDOM, with};
 
     #[test]
-    fn the_exact_mapper_is_exact() {
+    fn the_exact_mapper_has_exact_texels() {
         let mut jobs = Box::new(FrameJobs::new());
         for name in ["ball", "grazing-4096", RANDOM] {
             with(name, 3, |workload| {
@@ -158,7 +158,7 @@ mod tests {
     /// by du between the ends, the largest error in u is |du| (sqrt r - 1) / (sqrt r + 1). On a level floor,
     /// every column has the same error.
     #[test]
-    fn an_affine_column_errs_as_the_formula_says() {
+    fn the_error_of_an_affine_column_is_within_the_formulas_bound() {
         let affine = Mapper::parse("affine").unwrap();
         with("tilted", 0, |workload| {
             for faces in &workload.frames {
@@ -178,12 +178,12 @@ mod tests {
     }
 
     #[test]
-    fn an_affine_mapper_is_right_where_there_is_no_perspective() {
+    fn an_affine_mapper_has_a_small_error_without_perspective() {
         let affine = Mapper::parse("affine").unwrap();
         let mut jobs = Box::new(FrameJobs::new());
         with("facing", 0, |workload| {
             let accuracy = measure(workload, affine, &mut jobs);
-            // Vertices are on a grid of 1/256 pixel, but the truth is not.
+            // Vertices are rounded to 1/256 pixel, but the exact coordinate is not.
             assert!(accuracy.errors.largest() < 0.02, "{accuracy:?}");
             assert!(accuracy.psnr > 25.0);
         });

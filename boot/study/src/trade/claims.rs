@@ -14,11 +14,11 @@ use super::stats::Spread;
 use super::table::{Table, decibels, percent, texels};
 use super::workload::with_poses;
 
-/// A claim and its measurement.
+/// A source's claim and its measurement.
 #[derive(Clone, Debug)]
 pub struct Claim {
     /// The source of the claim.
-    pub place: &'static str,
+    pub source: &'static str,
     /// The claim.
     pub claimed: &'static str,
     /// The measured values.
@@ -58,7 +58,7 @@ impl Loops<'_> {
     }
 }
 
-const NOT_MEASURED: &str = "not measured: its mappers were left out";
+const NOT_MEASURED: &str = "not measured, because this run left the mappers out";
 
 /// Angles between the screen's axes and the line of constant depth, in tenths of a degree.
 const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
@@ -115,54 +115,54 @@ pub fn all(
     };
     vec![
         Claim {
-            place: "57, listing 57.2",
+            source: "57, listing 57.2",
             claimed: "more than twice as fast as listing 57.1",
             measured: loops.ratio(("row-multiply", Polygons), ("row-steps", Polygons)),
-            why: "A multiplication was 13 to 42 cycles and is 3 now, hidden behind other pixels'; a \
-                  chain of steps waits for itself. On a card both choose the plane anew for every \
-                  pixel.",
+            why: "A multiplication cost 13 to 42 cycles; now it costs 3, and overlaps with other \
+                  pixels. Steps form a chain in which each waits for the one before. On a VGA both \
+                  listings select the plane for every pixel.",
         },
         Claim {
-            place: "58, of listing 58.1",
+            source: "58, of listing 58.1",
             claimed: "nearly 10 % from unrolling",
             measured: format!(
                 "{:.1} % from unrolling a loop of shifts and masks eight times",
                 100.0 * (1.0 - 1.0 / unrolling.median)
             ),
-            why: "A jump that is foreseen costs next to nothing, so that unrolling gains little, or \
-                  loses by its own bookkeeping.",
+            why: "A predicted branch costs almost nothing, so unrolling gains little, or loses to its \
+                  own bookkeeping.",
         },
         Claim {
-            place: "58, listing 58.2",
+            source: "58, listing 58.2",
             claimed: "columns 2 to 4 times as fast as rows",
             measured: format!(
                 "{} by polygons, {} with both by planes",
                 loops.ratio(("row-steps", Polygons), ("two-carries", Polygons)),
                 loops.ratio(("row-steps", Planes), ("two-carries", Planes)),
             ),
-            why: "In RAM there is no OUT, which was most of the gain; down a column every store \
-                  meets another line of the cache. On a card the port writes count: a column \
-                  takes one, a row one a pixel.",
+            why: "RAM needs no OUT, whose cost was most of the gain, and each store down a column \
+                  is in another cache line. On a VGA the port writes count: a column needs one, a row \
+                  one for each pixel.",
         },
         Claim {
-            place: "58, at the end",
-            claimed: "5 to 10 times in all",
+            source: "58, at the end",
+            claimed: "5 to 10 times as fast in all",
             measured: format!(
                 "{} from `row-steps` to `packed`, by polygons{best}",
                 loops.ratio(("row-steps", Polygons), ("packed", Polygons)),
             ),
-            why: "The order of the planes now gains what the loop gained then.",
+            why: "Drawing plane by plane now gains what the loop gained then.",
         },
         Claim {
-            place: "58, of John Miles's loop",
+            source: "58, of John Miles's loop",
             claimed: "a table of two steps costs half a cycle to one more than the branch",
             measured: two_steps,
-            why: "Carries come as regularly as steps add up, which today's predictors learn: then \
-                  the branch is free, as it nearly was. Where they do not learn it, a wrong guess \
-                  costs some 15 cycles, and the table none.",
+            why: "Carries follow a regular pattern, which today's branch predictors learn: then the \
+                  branch is free. Where they do not learn the pattern, a misprediction costs about 15 \
+                  cycles, and the table none.",
         },
         Claim {
-            place: "58, listing 58.3",
+            source: "58, listing 58.3",
             claimed: "packed fractions: from 22 cycles to 10, and 9 without a segment prefix",
             measured: format!(
                 "{} from `two-carries` to `packed` ({} {unit}) by polygons, {} ({}) by planes",
@@ -171,11 +171,10 @@ pub fn all(
                 loops.ratio(("two-carries", Planes), ("packed", Planes)),
                 time("packed", Planes),
             ),
-            why: "64-bit code has no segments to swap. Two branches that are not foreseen become \
-                  one.",
+            why: "64-bit code has no segments to swap. One unpredicted branch replaces two.",
         },
         Claim {
-            place: "Free-direction mapping",
+            source: "Free-direction mapping",
             claimed: "looks worst for very small rotations, Hc or Vc near 0",
             measured: match tilts {
                 None => NOT_MEASURED.into(),
@@ -186,17 +185,18 @@ pub fn all(
                     format!("other texels at {}", each.collect::<Vec<_>>().join(", "))
                 }
             },
-            why: "The share of wrong texels does not tell: it is the same at any slope but 0 and 45 \
-                  degrees, where the lines meet the pixels' centres. At a small slope a line keeps \
-                  to one row for long and then jumps, so that the same error shows as long seams.",
+            why: "The share of wrong texels does not show it: it is about the same at every slope \
+                  except 0 and 45 degrees, where the lines meet the pixels' centres. At a small slope \
+                  a line stays in one row for long and then jumps, so the same error shows as long \
+                  seams.",
         },
         Claim {
-            place: "Subdivision",
+            source: "Subdivision",
             claimed: "the quadratic looks better than the linear with fewer pieces",
             measured: quadratic(tables),
-            why: "Half as many pieces take as many quotients. Error falls with the cube of a \
-                  piece's length in place of its square, while depth changes little in a piece; \
-                  near a horizon it does not.",
+            why: "Half as many pieces need as many quotients. The error falls with the cube of a \
+                  piece's length instead of its square as long as the depth changes little in a piece, \
+                  which is not so near a horizon.",
         },
     ]
 }
@@ -212,15 +212,15 @@ fn quadratic(tables: &[Table]) -> String {
         if !["tilted", "grazing-16", "grazing-4096", "cube"].contains(&&table.scene[..]) {
             continue;
         }
-        let told = |accuracy: &Accuracy| {
+        let figures = |accuracy: &Accuracy| {
             let mean = texels(accuracy.errors.mean());
             format!("{mean} ({})", decibels(accuracy.psnr))
         };
         parts.push(format!(
             "{}: {} to {}",
             table.scene,
-            told(&quadratic.accuracy),
-            told(&linear.accuracy)
+            figures(&quadratic.accuracy),
+            figures(&linear.accuracy)
         ));
     }
     match parts.is_empty() {
@@ -234,17 +234,17 @@ fn quadratic(tables: &[Table]) -> String {
 
 /// Returns the cells of the table, the header first.
 pub fn cells(claims: &[Claim]) -> Vec<Vec<String>> {
-    let head = ["chapter", "claimed", "measured here", "why"].map(String::from);
+    let head = ["source", "claim", "measured here", "reason"].map(String::from);
     let mut cells = vec![head.to_vec()];
     cells.extend(claims.iter().map(|claim| {
         let Claim {
-            place,
+            source,
             claimed,
             measured,
             why,
         } = claim;
         vec![
-            (*place).into(),
+            (*source).into(),
             (*claimed).into(),
             measured.clone(),
             why.split_whitespace().collect::<Vec<_>>().join(" "),

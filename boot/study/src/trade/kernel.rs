@@ -15,7 +15,7 @@ pub fn cells(measured: &KernelFigures) -> Vec<Vec<String>> {
         "mapper",
         "order",
         "instructions a pixel, screen",
-        "the same with bit-extract",
+        "instructions a pixel, screen, with bit-extract",
         "instructions a pixel, ball",
         "port writes",
         "stores",
@@ -73,26 +73,26 @@ pub fn targets(
     measured: Option<&KernelFigures>,
 ) -> Vec<Vec<String>> {
     let mut cells = vec![
-        ["what", "aimed at", "measured", ""]
+        ["figure", "target", "measured", ""]
             .map(String::from)
             .to_vec(),
     ];
-    let mut add = |what: &str, aimed: f64, most: bool, figure: Option<f64>| {
+    let mut add = |what: &str, target: f64, most: bool, figure: Option<f64>| {
         let bound = if most { "at most" } else { "at least" };
-        let said = figure.map_or("not measured".into(), |figure| format!("{figure:.2}"));
+        let measured = figure.map_or("not measured".into(), |figure| format!("{figure:.2}"));
         let met = match figure.map(|figure| {
             if most {
-                figure <= aimed
+                figure <= target
             } else {
-                figure >= aimed
+                figure >= target
             }
         }) {
             Some(true) => "met",
             Some(false) => "missed",
             None => "",
         };
-        let aimed = format!("{bound} {aimed}");
-        cells.push(vec![what.into(), aimed, said, met.into()]);
+        let target = format!("{bound} {target}");
+        cells.push(vec![what.into(), target, measured, met.into()]);
     };
     let host = Host { tables, sweep };
     add(
@@ -133,7 +133,7 @@ pub fn targets(
     );
     let what = "instructions a pixel of the best affine loop, full screen, set-up included";
     add(what, 6.6, true, screen(Cpu::Baseline, affine));
-    let what = "the same with bit-extract";
+    let what = "instructions a pixel of the best affine loop with bit-extract, full screen, set-up included";
     add(what, 4.6, true, screen(Cpu::Max, affine));
     add(
         "`linear-16` over the best affine loop, by planes",
@@ -171,13 +171,13 @@ pub fn targets(
         rows.min_by(f64::total_cmp)
     };
     add(
-        "frame of the ball under TCG over bare byte stores of its pixels, best way",
+        "frame of the ball under TCG over bare byte stores of its pixels, fastest mapper",
         0.75,
         true,
         frame(|row| row.frame_over_bare().median),
     );
     add(
-        "frame of the ball under TCG over presenting it already drawn, best way",
+        "frame of the ball under TCG over presenting it already drawn, fastest mapper",
         1.25,
         true,
         frame(|row| row.frame_over_present().median),

@@ -8,9 +8,12 @@ use texmap::Mapper;
 use super::accuracy::{self, Accuracy, FrameJobs};
 use super::table::{decibels, percent, texels};
 use super::workload::Workload;
+use frames::html::{self, escape};
 use frames::indexed::IndexedImage;
 use frames::rgb::RgbImage;
 
+/// The page's title.
+const TITLE: &str = "What accuracy costs";
 /// The page's addition to the style sheet of the reports.
 const STYLE: &str = include_str!("page.css");
 
@@ -25,8 +28,8 @@ const COLOURS: [[u8; 3]; 6] = [
     [0xFB, 0x9A, 0x3C],
     [0xFF, 0xF5, 0xB0],
 ];
-/// The maps' colour where no solid is.
-const NOTHING: [u8; 3] = [0x4C, 0x4C, 0x4C];
+/// The maps' colour of the background.
+const BACKGROUND: [u8; 3] = [0x4C, 0x4C, 0x4C];
 
 /// A frame and the map of its errors, shared by all mappers that draw both alike.
 #[derive(Clone, Debug)]
@@ -67,7 +70,7 @@ impl Gallery {
                 psnr: super::stats::psnr(&colours(&pixels), &exact),
                 ..Accuracy::default()
             };
-            let mut heat = vec![NOTHING; WIDTH * HEIGHT];
+            let mut heat = vec![BACKGROUND; WIDTH * HEIGHT];
             for face in &workload.frames[0] {
                 let texture = workload.texture(face.face().texture);
                 accuracy::errors(mapper, face, texture, |(x, y), error, other| {
@@ -119,7 +122,7 @@ impl Gallery {
         let _ = write!(
             page,
             "<section class=\"card\">\n<h2>The scene <code>{scene}</code></h2>\n<p>{about}. \
-             Mappers that are alike in every pixel share a frame.</p>\n<div class=\"gallery\">\n"
+             Mappers whose frames and errors are equal share an image.</p>\n<div class=\"gallery\">\n"
         );
         for shown in &self.shown {
             let names = shown.mappers.iter().map(|name| escape(name));
@@ -133,7 +136,7 @@ impl Gallery {
                  <img src=\"{folder}/{}\" alt=\"its errors\" width=\"320\" height=\"240\"></figure>",
                 texels(errors.largest()),
                 texels(errors.mean()),
-                percent(shown.accuracy.other_share()).replace('<', "&lt;"),
+                escape(&percent(shown.accuracy.other_share())),
                 decibels(shown.accuracy.psnr),
                 self.file(shown, false),
                 self.file(shown, true),
@@ -176,15 +179,12 @@ pub struct TradePage<'a> {
 impl TradePage<'_> {
     /// Returns the page as HTML.
     pub fn html(&self) -> String {
-        let mut page = format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <title>What accuracy costs - Crystal Ball</title>\n<style>\n{}{STYLE}</style>\n</head>\n\
-             <body class=\"trade\">\n<header class=\"top\">\n\
+        let mut page = html::head(TITLE, STYLE);
+        let _ = write!(
+            page,
+            "<body class=\"trade\">\n<header class=\"top\">\n\
              <p class=\"brand\">Crystal Ball <span>trade</span></p>\n\
-             <h1>What accuracy costs</h1>\n",
-            frames::report::STYLE
+             <h1>{TITLE}</h1>\n"
         );
         for line in self.about {
             let _ = writeln!(page, "<p>{}</p>", escape(line));
@@ -226,8 +226,8 @@ impl TradePage<'_> {
             gallery.section(&mut page, self.folder);
         }
         page += "<section class=\"card claims\">\n<h2>The sources' claims, measured</h2>\n<p>What the book's \
-                 chapters 57 and 58 and the articles on perspective claim, of the machines of their \
-                 day, and what it comes to here.</p>\n";
+                 chapters 57 and 58 and the articles on perspective claim for the machines of their \
+                 time, and what this run measured.</p>\n";
         table(&mut page, self.claims);
         page += "</section>\n</main>\n</body>\n</html>\n";
         page
@@ -236,7 +236,7 @@ impl TradePage<'_> {
 
 const LEGEND: &str = "<aside class=\"heat\"><span>Maps of the error, in texels:</span>\
                       <i></i><ol><li>1/256</li><li>1/32</li><li>1/4</li><li>2</li><li>8</li><li>32</li></ol>\
-                      <span>grey: no solid</span></aside>\n";
+                      <span>grey: background</span></aside>\n";
 
 /// Adds a table to the page. The first line of `cells` is the header.
 fn table(page: &mut String, cells: &[Vec<String>]) {
@@ -270,20 +270,13 @@ fn code(text: &str) -> String {
     out
 }
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::trade::workload::with;
 
     #[test]
-    fn colours_go_from_small_to_large_errors_and_the_legend_has_them() {
+    fn the_legend_has_the_colours_of_small_to_large_errors() {
         assert_eq!(colour(0.0), COLOURS[0]);
         assert_eq!(colour(1.0 / 256.0), COLOURS[0]);
         assert_eq!(colour(32.0), COLOURS[5]);
@@ -297,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_names_every_file_and_fetches_nothing() {
+    fn the_page_names_every_image_and_loads_nothing_from_the_network() {
         let mappers = ["affine", "packed", "exact"].map(|name| Mapper::parse(name).unwrap());
         let mut jobs = Box::new(FrameJobs::new());
         let gallery = with("tilted", 0, |workload| {
@@ -311,7 +304,7 @@ mod tests {
             .find(|s| s.mappers[0] == "exact")
             .unwrap();
         assert_eq!(exact.accuracy.psnr, f64::INFINITY);
-        assert!(exact.heat.pixels.contains(&COLOURS[0]) && exact.heat.pixels.contains(&NOTHING));
+        assert!(exact.heat.pixels.contains(&COLOURS[0]) && exact.heat.pixels.contains(&BACKGROUND));
         let html = TradePage {
             about: &["a <b>".into()],
             plots: &[("caption".into(), "<svg></svg>".into())],

@@ -18,7 +18,7 @@ const MARGINS: [i32; 4] = [96, 36, 92, 72];
 
 const INK: RGBColor = RGBColor(0x1B, 0x1B, 0x20);
 const SOFT: RGBColor = RGBColor(0x62, 0x62, 0x6E);
-const LINE: RGBColor = RGBColor(0xE4, 0xE4, 0xEA);
+const GRID: RGBColor = RGBColor(0xE4, 0xE4, 0xEA);
 const FRONT: RGBColor = RGBColor(0xC8, 0x10, 0x4F);
 const FONT: &str = "system-ui, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
@@ -159,16 +159,16 @@ fn number(value: f64) -> String {
     }
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+type Drawing<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 /// Returns the error of a drawing that fails.
 fn failed(error: impl std::fmt::Display) -> anyhow::Error {
-    anyhow!("a plot cannot be drawn: {error}")
+    anyhow!("the plot cannot be drawn: {error}")
 }
 
 /// Writes a text whose left end, middle or right end is at a position.
 fn write(
-    area: &Area<'_>,
+    area: &Drawing<'_>,
     text: &str,
     at: (i32, i32),
     size: i32,
@@ -184,7 +184,7 @@ fn write(
 
 /// Draws the frame of a plot: the title, the axes, their ticks and their names.
 fn frame(
-    area: &Area<'_>,
+    area: &Drawing<'_>,
     title: [&str; 2],
     axes: (&PlotAxis, &PlotAxis),
     names: [&str; 2],
@@ -201,7 +201,7 @@ fn frame(
     };
     for tick in x.ticks() {
         let at = x.place(tick);
-        line((at, top), (at, bottom), LINE)?;
+        line((at, top), (at, bottom), GRID)?;
         write(
             area,
             &number(tick),
@@ -213,7 +213,7 @@ fn frame(
     }
     for tick in y.ticks() {
         let at = y.place(tick);
-        line((left, at), (right, at), LINE)?;
+        line((left, at), (right, at), GRID)?;
         write(area, &number(tick), (left - 8, at), 12, SOFT, HPos::Right)?;
     }
     line((left, bottom), (right, bottom), SOFT)?;
@@ -382,7 +382,7 @@ pub fn error_against_cost(
 }
 
 /// Draws the legend: the families in the plot, the two marks, and the front.
-fn legend(area: &Area<'_>, points: &[PlotPoint]) -> anyhow::Result<()> {
+fn legend(area: &Drawing<'_>, points: &[PlotPoint]) -> anyhow::Result<()> {
     let (mut x, y) = (MARGINS[0], 74);
     for (i, (name, colour)) in FAMILIES.iter().enumerate() {
         if points.iter().any(|point| family(point.mapper) == i) {
@@ -490,7 +490,7 @@ mod tests {
     }
 
     #[test]
-    fn names_lie_over_no_other_name_and_no_point() {
+    fn a_name_overlaps_no_other_name_and_no_point() {
         let mut random = seeded::generator();
         let inside = [60, 60, 1000, 600];
         for _ in 0..20 {
@@ -515,7 +515,7 @@ mod tests {
     }
 
     #[test]
-    fn axes_have_a_few_round_ticks() {
+    fn an_axis_has_3_to_12_round_ticks() {
         for (from, to, log) in [
             (1.1, 30.0, true),
             (0.9, 4.0, true),
@@ -546,7 +546,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plot_names_every_mapper_and_draws_the_front() {
+    fn the_plot_of_error_against_cost_names_every_mapper() {
         let all = Mapper::ALL.iter().zip(1..);
         let points: Vec<_> = all
             .map(|(named, i)| point(named.1, f64::from(i), 100.0 / f64::from(i)))
@@ -561,7 +561,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_drawn_and_named() {
+    fn the_plot_of_lines_names_every_line() {
         let line = |name: &str, scale: f64| PlotLine {
             name: name.into(),
             at: (0..50)

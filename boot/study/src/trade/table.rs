@@ -304,7 +304,7 @@ fn field(text: &str) -> String {
 pub(super) mod tests {
     use super::*;
 
-    /// Returns a table with figures of no meaning.
+    /// Returns a table of made-up figures.
     pub fn made_up(scene: &str, scale: f64) -> Table {
         let mut rows = Vec::new();
         for (i, &(_, mapper, _)) in Mapper::ALL.iter().enumerate() {
@@ -344,7 +344,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn csv_has_as_many_fields_in_every_line() {
+    fn every_line_of_the_csv_has_the_same_number_of_fields() {
         let tables = [made_up("a", 1.0), made_up("b,\"c\"", 2.0)];
         let text = csv(&tables);
         let mut lines = text.lines();
@@ -361,7 +361,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn markdown_has_as_many_cells_in_every_line() {
+    fn every_line_of_the_markdown_has_the_same_number_of_cells() {
         let table = made_up("a", 1.0);
         let text = markdown(&table.cells());
         let bars = |line: &str| line.matches('|').count();
@@ -372,7 +372,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn tables_together_have_all_errors_and_mean_costs() {
+    fn a_joined_table_has_all_errors_and_the_mean_costs() {
         let tables = [made_up("a", 1.0), made_up("b", 4.0)];
         let all = Table::all(&tables);
         for (i, row) in all.rows.iter().enumerate() {
@@ -389,7 +389,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn figures_have_the_digits_that_mean_something() {
+    fn figures_are_printed_with_their_significant_digits() {
         for (error, text) in [
             (0.0, "0"),
             (123.4, "123"),

@@ -53,7 +53,7 @@ impl OwnedFace {
     }
 }
 
-/// A scene to measure on.
+/// A scene at several poses, projected, with its textures lit: what a mapper is measured on.
 #[derive(Debug)]
 pub struct Workload<'a> {
     /// The scene's name.
@@ -111,40 +111,40 @@ pub fn names() -> impl Iterator<Item = &'static str> {
         .chain([RANDOM])
 }
 
-/// Makes the workload of a name, and passes it to `look`. `seed` is the random scene's.
+/// Makes the workload of a name, and passes it to `measure`. `seed` is the random scene's.
 ///
 /// # Panics
 /// If no scene has the name.
-pub fn with<T>(name: &str, seed: u64, look: impl FnOnce(&Workload<'_>) -> T) -> T {
+pub fn with<T>(name: &str, seed: u64, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
     if name == RANDOM {
-        return with_random(seed, look);
+        return with_random(seed, measure);
     }
     let entry = Entry::parse(name).expect("the scene was looked up before");
-    with_entry(entry, look)
+    with_entry(entry, measure)
 }
 
-/// Makes a workload of a scene at [`TICKS`], and passes it to `look`.
-pub fn with_entry<T>(entry: &Entry<'_>, look: impl FnOnce(&Workload<'_>) -> T) -> T {
-    with_poses(entry, &TICKS.map(|tick| entry.pose(tick)), look)
+/// Makes a workload of a scene at [`TICKS`], and passes it to `measure`.
+pub fn with_entry<T>(entry: &Entry<'_>, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
+    with_poses(entry, &TICKS.map(|tick| entry.pose(tick)), measure)
 }
 
-/// Makes a workload of a scene at some poses, and passes it to `look`.
+/// Makes a workload of a scene at some poses, and passes it to `measure`.
 pub fn with_poses<T>(
     entry: &Entry<'_>,
     poses: &[Pose],
-    look: impl FnOnce(&Workload<'_>) -> T,
+    measure: impl FnOnce(&Workload<'_>) -> T,
 ) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = in_place::boxed!(Storage);
     let textures = entry.paint(&mut texels);
     let mut stage = Stage::new(&mut storage, entry.scene(&textures));
     let about = entry.about.to_string();
-    look(&Workload::new(entry.name, about, &mut stage, poses))
+    measure(&Workload::new(entry.name, about, &mut stage, poses))
 }
 
 /// Makes the random workload, with the colours and the texture of the scene `tilted`, and passes it to
-/// `look`.
-fn with_random<T>(seed: u64, look: impl FnOnce(&Workload<'_>) -> T) -> T {
+/// `measure`.
+fn with_random<T>(seed: u64, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = in_place::boxed!(Storage);
     let entry = Entry::parse("tilted").expect("it is in the catalogue");
@@ -169,7 +169,7 @@ fn with_random<T>(seed: u64, look: impl FnOnce(&Workload<'_>) -> T) -> T {
     };
     let about = format!("{POLYGONS} parallelograms at random, seed {seed}");
     let mut stage = Stage::new(&mut storage, scene);
-    look(&Workload::new(RANDOM, about, &mut stage, &[pose]))
+    measure(&Workload::new(RANDOM, about, &mut stage, &[pose]))
 }
 
 /// Returns parallelograms that face the eye, from near to far, each with the whole texture.
@@ -236,7 +236,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_subject_has_faces_and_repeats() {
+    fn every_workload_has_faces_and_is_the_same_each_time() {
         for name in names() {
             let faces = |workload: &Workload<'_>| {
                 assert_eq!(workload.name, name);
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn random_polygons_look_at_the_viewer_and_depend_on_the_seed() {
+    fn random_polygons_face_the_viewer_and_depend_on_the_seed() {
         let polygons = |seed| {
             with(RANDOM, seed, |workload| {
                 let faces = &workload.frames[0];
