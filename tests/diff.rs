@@ -255,7 +255,7 @@ fn a_file_that_is_not_a_valid_dump_or_png_is_an_error_with_the_reason() {
     };
     screen.write_png(&mut rgb).unwrap();
     let not_a_png = "and not a PNG; give a dump or an indexed PNG";
-    for (name, bytes, words) in [
+    for (name, bytes, parts) in [
         ("empty", Vec::new(), ["line 1: not a dump", not_a_png]),
         (
             "text",
@@ -331,8 +331,8 @@ fn a_file_that_is_not_a_valid_dump_or_png_is_an_error_with_the_reason() {
             let begin = format!("error: {name}: ");
             assert!(exit.errors.starts_with(&begin), "{exit:?}");
             assert_eq!(exit.errors.lines().count(), 1, "{exit:?}");
-            for words in words {
-                assert!(exit.errors.contains(words), "{words}: {exit:?}");
+            for part in parts {
+                assert!(exit.errors.contains(part), "{part}: {exit:?}");
             }
         }
     }
@@ -389,7 +389,7 @@ fn a_report_shows_every_pair_that_differs() {
         "{exit:?}"
     );
     let html = world.read("it differs.html");
-    for words in [
+    for part in [
         "<h1>4 of 6 pairs differ, 1 could not be compared</h1>",
         FIRST,
         "6.dump: in a, but missing from b",
@@ -397,7 +397,7 @@ fn a_report_shows_every_pair_that_differs() {
         "All of video memory",
         "<td class=\"n\">1</td>",
     ] {
-        assert!(html.contains(words), "{words}");
+        assert!(html.contains(part), "{part}");
     }
     assert!(!html.contains("<3>") && !html.contains("2.dump"));
     let mut expected = Vec::new();
@@ -470,7 +470,7 @@ fn a_report_that_cannot_be_written_is_an_error_after_the_differences() {
     world.put("b", page(one_pixel));
     world.put("blocked-files", "a file where the folder should be");
     fs::create_dir(world.path("folder.html")).unwrap();
-    for (report, words) in [
+    for (report, start) in [
         (
             "nowhere/r.html",
             "error: nowhere/r-files: the folder cannot be created: No such",
@@ -488,7 +488,7 @@ fn a_report_that_cannot_be_written_is_an_error_after_the_differences() {
         let exit = world.diff(&["a", "b", "--report", report]);
         assert_eq!(exit.code, Some(2), "{exit:?}");
         assert_eq!(exit.out, format!("b differs from a: {FIRST}\n"));
-        assert!(exit.errors.starts_with(words), "{exit:?}");
+        assert!(exit.errors.starts_with(start), "{exit:?}");
     }
     assert!(!world.path("blocked.html").exists());
     let equal = world.diff(&["a", "a", "--report", "nowhere/r.html"]);

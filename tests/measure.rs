@@ -18,7 +18,7 @@ fn mappers(names: &[&str]) -> Vec<Mapper> {
 /// Measures a mapper of each kind. The run itself checks that figures repeat under `-icount`, that the number
 /// of pixels is equal without it, and that QEMU and the emulated VGA draw the same frames.
 #[test]
-fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
+fn the_benchmark_kernel_boots_and_its_figures_are_plausible() {
     LazyLock::force(&READY);
     let names = ["row-passes", "affine", "exact"];
     let measured = measure::run(&MeasureConfig {
@@ -29,7 +29,7 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
     })
     .unwrap();
     let [cpu] = &measured.cpus[..] else {
-        panic!("one CPU model was asked for");
+        panic!("expected the figures of one CPU model");
     };
     assert_eq!(cpu.rows.len(), names.len() * Order::ALL.len());
     assert!(!cpu.bmi2, "{} has no BMI2", cpu.cpu);
@@ -66,7 +66,7 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
         for pair in parts.windows(2) {
             assert!(a_pixel(pair[0]) < a_pixel(pair[1]), "{name}: {pair:?}");
         }
-        // The same drawing costs the same on either side of the card's window, apart from Map Mask.
+        // The same drawing costs the same in RAM and in video memory, apart from Map Mask.
         assert!(
             a_pixel(Work::ScreenRam) <= a_pixel(Work::ScreenCard),
             "{name}"
@@ -83,16 +83,16 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
         );
         assert!(
             shortest.instructions_a_pixel() > longest.instructions_a_pixel(),
-            "{name}: a run of one pixel pays all of its set-up"
+            "{name}: a span of one pixel pays for a whole set-up"
         );
         assert_eq!(row.cost(Work::FrameCard).ticks.len(), 1);
         assert_eq!(row.accesses.loads, 0, "{name} reads video memory");
     }
 }
 
-/// The counters must not change what is drawn, and each order has its characteristic counts.
+/// Also checks that each order has its characteristic counts.
 #[test]
-fn counting_changes_no_byte() {
+fn counters_do_not_change_what_is_drawn() {
     let mut memories = BenchMemories::default();
     let mut emulated = EmulatedBenches::new(&mut memories);
     for &(_, mapper, _) in Mapper::ALL {
@@ -145,7 +145,7 @@ fn table(measured: &KernelFigures) -> String {
         let a_pixel = |work| reference.cost(work).instructions_a_pixel();
         writeln!(
             table,
-            "\n-cpu {}, {bmi2} BMI2; bare stores {:.2} instructions a pixel in RAM, {:.2} on the card; \
+            "\n-cpu {}, {bmi2} BMI2; bare stores {:.2} instructions a pixel in RAM, {:.2} in video memory; \
              presenting {:.2}\n{:28} {:>7} {:>7} {:>7} {:>7} {:>7}  {:>6} {:>7} {:>6}  frame over bare stores / over presenting",
             cpu.cpu,
             a_pixel(Work::BareRam),

@@ -199,16 +199,16 @@ mod tests {
     #[test]
     fn a_dump_through_the_ports_equals_a_dump_from_outside() {
         let mut memory = memory();
-        let mut card = EmulatedDemo::new(&mut memory).unwrap();
+        let mut demo = EmulatedDemo::new(&mut memory).unwrap();
         for frames in [&[][..], &[FrameName::Number(0)], &[FrameName::Number(7); 3]] {
-            card.show(frames).unwrap();
+            demo.show(frames).unwrap();
             for content in [Content::Page, Content::Memory] {
-                let seen = card.dump(content).unwrap();
-                let sent = card.send(Command::Dump(content)).unwrap();
+                let seen = demo.dump(content).unwrap();
+                let sent = demo.send(Command::Dump(content)).unwrap();
                 assert_eq!(sent, seen.lines());
                 assert_eq!(Dump::from_lines(&sent).unwrap(), seen);
                 assert_eq!(
-                    card.send(Command::Checksums(content)).unwrap(),
+                    demo.send(Command::Checksums(content)).unwrap(),
                     seen.checksums()
                 );
             }
@@ -218,18 +218,18 @@ mod tests {
     #[test]
     fn a_refused_command_has_the_reason_in_its_error() {
         let mut memory = memory();
-        let mut card = EmulatedDemo::new(&mut memory).unwrap();
+        let mut demo = EmulatedDemo::new(&mut memory).unwrap();
         let far = FrameName::Pose {
             yaw: 0,
             pitch: 0,
             roll: 0,
             distance: u32::MAX,
         };
-        let error = card.show(&[far]).unwrap_err().to_string();
+        let error = demo.show(&[far]).unwrap_err().to_string();
         assert!(
             error.ends_with("refused: a distance is 0 to 00800000"),
             "{error}"
         );
-        assert!(card.send(Command::Leave).is_err());
+        assert!(demo.send(Command::Leave).is_err());
     }
 }

@@ -26,8 +26,8 @@
 //! pass the screendump, which is compared without a checksum: the wrong byte's colour would have to be equal.
 //! Checksums cannot show a fault in how bytes are sent and read, so some goldens send their bytes.
 //!
-//! Both VGAs run the same program and renderer, so equal VGAs alone would prove little about the frame. The
-//! PNG is what a person once looked at.
+//! Both VGAs run the same program and renderer, so equal VGAs alone would prove little about the frame. A
+//! person looked at each PNG before it was committed.
 
 use std::fmt;
 use std::fs::File;

@@ -1,7 +1,7 @@
 //! Escapes text for HTML.
 //!
-//! The two pages of this project (`report`, and `trade`'s) are written by hand with `write!`: a template crate
-//! would add a procedural macro to every build, and both pages are mostly tables.
+//! The two pages of this project (`report`, and the page of `trade`) are built with `write!`, without a
+//! template crate: both are mostly tables, whose rows `write!` states as plainly.
 
 /// Returns text escaped for HTML, including an attribute's quotes.
 pub fn escape(text: &str) -> String {

@@ -53,13 +53,13 @@ const SAME_INDEX: [u8; 3] = [0x8F, 0x7B, 0xFF];
 pub struct Report {
     between: Option<[String; 2]>,
     equal: usize,
-    different: Vec<Pair>,
+    different: Vec<DifferentPair>,
     incomparable: Vec<[String; 2]>,
 }
 
 /// A pair that differs.
 #[derive(Clone, Debug)]
-struct Pair {
+struct DifferentPair {
     name: String,
     expected: Capture,
     got: Capture,
@@ -85,7 +85,7 @@ impl Report {
 
     /// Adds a pair that differs.
     pub fn add(&mut self, name: &str, expected: &Capture, got: &Capture, difference: &Difference) {
-        self.different.push(Pair {
+        self.different.push(DifferentPair {
             name: name.into(),
             expected: expected.clone(),
             got: got.clone(),
@@ -261,7 +261,7 @@ struct ImagePair {
     layout: PixelLayout,
 }
 
-impl Pair {
+impl DifferentPair {
     fn views(&self) -> Vec<ImagePair> {
         let (expected, got) = (self.expected.frame(), self.got.frame());
         let page = ImagePair {

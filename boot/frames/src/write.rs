@@ -124,7 +124,7 @@ impl DumpOptions {
     /// The VGA fails or a file cannot be written; the files written before are complete.
     pub fn write(
         &self,
-        card: &mut impl Backend,
+        backend: &mut impl Backend,
         options: &FrameOptions,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
     ) -> anyhow::Result<()> {
@@ -142,12 +142,12 @@ impl DumpOptions {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            card.show_with(options, &[])?;
-            card.send(match motion {
+            backend.show_with(options, &[])?;
+            backend.send(match motion {
                 Some(motion) => Command::ShowMoving(frame, motion),
                 None => Command::Show(frame),
             })?;
-            let dump = card.dump(content)?;
+            let dump = backend.dump(content)?;
             let stem = self.out.join(stem(frame, motion, content));
             let text = stem.with_added_extension("dump");
             write_atomically(&text, |file| Ok(dump.write(std::io::BufWriter::new(file))?))?;
@@ -195,11 +195,11 @@ mod tests {
     #[test]
     fn a_frame_of_reduced_quality_is_drawn_again_from_its_header() {
         let mut memory = backend::memory();
-        let mut card = EmulatedDemo::new(&mut memory).unwrap();
+        let mut demo = EmulatedDemo::new(&mut memory).unwrap();
         for line in ["scene cube", "mapper exact", "steer 5 quality", "show at 9"] {
-            card.send(Command::parse(line).unwrap()).unwrap();
+            demo.send(Command::parse(line).unwrap()).unwrap();
         }
-        let shown = card.dump(Content::Page).unwrap();
+        let shown = demo.dump(Content::Page).unwrap();
         assert_eq!(shown.header.frame, Some(FrameName::Number(9)));
         let motion = shown.header.motion.expect("it is in reduced quality");
         let Motion {
@@ -230,7 +230,7 @@ mod tests {
                 files.push(file.to_path_buf());
                 Ok(())
             };
-            frames(motion).write(&mut card, &options, wrote).unwrap();
+            frames(motion).write(&mut demo, &options, wrote).unwrap();
             Dump::read(&std::fs::read(&files[0]).unwrap()).unwrap()
         };
         let again = draw(Some(vec![yaw, pitch, roll, distance]));

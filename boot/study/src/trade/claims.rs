@@ -1,6 +1,6 @@
 //! The sources' claims, beside the measurements of this run.
 //!
-//! The texts are fixed; the figures are those of the run.
+//! The texts are fixed; the figures come from the run.
 
 use modex::HEIGHT;
 use scene::Pose;
@@ -9,7 +9,7 @@ use texmap::{Mapper, Order};
 
 use super::accuracy::{self, Accuracy, FrameJobs};
 use super::clock;
-use super::cost::{ANGLE, LENGTH, SweepPoint};
+use super::cost::{LENGTH, LongSpans, SweepPoint};
 use super::stats::Spread;
 use super::table::{Table, decibels, percent, texels};
 use super::workload::with_poses;
@@ -25,37 +25,6 @@ pub struct Claim {
     pub measured: String,
     /// The reason for the difference.
     pub why: &'static str,
-}
-
-/// The times of drawing long spans, by the mapper's name.
-struct Loops<'a>(&'a [SweepPoint]);
-
-impl Loops<'_> {
-    fn time(&self, mapper: &str, order: Order) -> Option<f64> {
-        let of = |point: &&SweepPoint| {
-            point.length == LENGTH
-                && point.angle == ANGLE
-                && point.order == order
-                && point.mapper.to_string() == mapper
-        };
-        self.0.iter().find(of).map(|point| point.cost.time.median)
-    }
-
-    fn ratio(&self, slow: (&str, Order), fast: (&str, Order)) -> String {
-        match (self.time(slow.0, slow.1), self.time(fast.0, fast.1)) {
-            (Some(slow), Some(fast)) => format!("{:.2} times", slow / fast),
-            _ => NOT_MEASURED.into(),
-        }
-    }
-
-    /// Returns the fastest affine column loop, and its time.
-    fn best(&self, order: Order) -> Option<(Mapper, f64)> {
-        let affine = Mapper::ALL
-            .iter()
-            .filter(|(_, mapper, _)| matches!(mapper, Mapper::Affine(_)));
-        let timed = affine.filter_map(|(name, mapper, _)| Some((*mapper, self.time(name, order)?)));
-        timed.min_by(|a, b| a.1.total_cmp(&b.1))
-    }
 }
 
 const NOT_MEASURED: &str = "not measured, because this run left the mappers out";
@@ -89,24 +58,35 @@ pub fn all(
     tilts: Option<&[(f64, Accuracy)]>,
 ) -> Vec<Claim> {
     use Order::{Planes, Polygons};
-    let loops = Loops(sweep);
+    let spans = LongSpans(sweep);
     let unit = clock::UNIT;
-    let time = |mapper, order| match loops.time(mapper, order) {
+    let time = |mapper, order| match spans.time(mapper, order) {
         Some(time) => format!("{time:.2}"),
         None => "?".into(),
     };
-    let best = match loops.best(Planes) {
-        Some((mapper, best)) => match loops.time("row-steps", Polygons) {
-            Some(rows) => format!("; to `{mapper}`, plane by plane, {:.2} times", rows / best),
-            None => String::new(),
-        },
-        None => String::new(),
+    let ratio = |slow: (&str, Order), fast: (&str, Order)| match (
+        spans.time(slow.0, slow.1),
+        spans.time(fast.0, fast.1),
+    ) {
+        (Some(slow), Some(fast)) => format!("{:.2} times", slow / fast),
+        _ => NOT_MEASURED.into(),
+    };
+    let best = match (
+        spans.time("row-steps", Polygons),
+        spans.fastest_affine(Planes),
+    ) {
+        (Some(rows), Some(best)) => format!(
+            "; to `{}`, plane by plane, {:.2} times",
+            best.mapper,
+            rows / best.cost.time.median
+        ),
+        _ => String::new(),
     };
     let two_steps = match (
-        loops.time("two-steps", Polygons),
-        loops.time("packed", Polygons),
-        loops.time("two-steps", Planes),
-        loops.time("packed", Planes),
+        spans.time("two-steps", Polygons),
+        spans.time("packed", Polygons),
+        spans.time("two-steps", Planes),
+        spans.time("packed", Planes),
     ) {
         (Some(a), Some(b), Some(c), Some(d)) => {
             format!("{:+.2} {unit} by polygons, {:+.2} by planes", a - b, c - d)
@@ -117,7 +97,7 @@ pub fn all(
         Claim {
             source: "57, listing 57.2",
             claimed: "more than twice as fast as listing 57.1",
-            measured: loops.ratio(("row-multiply", Polygons), ("row-steps", Polygons)),
+            measured: ratio(("row-multiply", Polygons), ("row-steps", Polygons)),
             why: "A multiplication cost 13 to 42 cycles; now it costs 3, and overlaps with other \
                   pixels. Steps form a chain in which each waits for the one before. On a VGA both \
                   listings select the plane for every pixel.",
@@ -137,8 +117,8 @@ pub fn all(
             claimed: "columns 2 to 4 times as fast as rows",
             measured: format!(
                 "{} by polygons, {} with both by planes",
-                loops.ratio(("row-steps", Polygons), ("two-carries", Polygons)),
-                loops.ratio(("row-steps", Planes), ("two-carries", Planes)),
+                ratio(("row-steps", Polygons), ("two-carries", Polygons)),
+                ratio(("row-steps", Planes), ("two-carries", Planes)),
             ),
             why: "RAM needs no OUT, whose cost was most of the gain, and each store down a column \
                   is in another cache line. On a VGA the port writes count: a column needs one, a row \
@@ -149,7 +129,7 @@ pub fn all(
             claimed: "5 to 10 times as fast in all",
             measured: format!(
                 "{} from `row-steps` to `packed`, by polygons{best}",
-                loops.ratio(("row-steps", Polygons), ("packed", Polygons)),
+                ratio(("row-steps", Polygons), ("packed", Polygons)),
             ),
             why: "Drawing plane by plane now gains what the loop gained then.",
         },
@@ -166,9 +146,9 @@ pub fn all(
             claimed: "packed fractions: from 22 cycles to 10, and 9 without a segment prefix",
             measured: format!(
                 "{} from `two-carries` to `packed` ({} {unit}) by polygons, {} ({}) by planes",
-                loops.ratio(("two-carries", Polygons), ("packed", Polygons)),
+                ratio(("two-carries", Polygons), ("packed", Polygons)),
                 time("packed", Polygons),
-                loops.ratio(("two-carries", Planes), ("packed", Planes)),
+                ratio(("two-carries", Planes), ("packed", Planes)),
                 time("packed", Planes),
             ),
             why: "64-bit code has no segments to swap. One unpredicted branch replaces two.",
@@ -259,7 +239,7 @@ const _: () = assert!(LENGTH as usize == HEIGHT);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trade::cost::PixelCost;
+    use crate::trade::cost::{ANGLE, PixelCost};
     use crate::trade::table::tests::made_up;
 
     fn sweep(mapper: &str, order: Order, time: f64) -> SweepPoint {

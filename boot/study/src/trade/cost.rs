@@ -21,7 +21,7 @@ use super::workload::{OwnedFace, Workload};
 pub const ROUNDS: usize = 5;
 
 /// The orders that differ in RAM. [`Order::Buffer`] draws as one of them does, and its presenting costs time
-/// only where a card exists.
+/// only on a VGA.
 pub const ORDERS: [Order; 2] = [Order::Polygons, Order::Planes];
 
 /// The work that is measured.
@@ -465,6 +465,35 @@ pub struct SweepPoint {
     pub cost: PixelCost,
 }
 
+/// The points of a sweep with spans of [`LENGTH`], at [`ANGLE`].
+#[derive(Clone, Copy, Debug)]
+pub struct LongSpans<'a>(pub &'a [SweepPoint]);
+
+impl<'a> LongSpans<'a> {
+    /// Returns the points of an order.
+    fn points(self, order: Order) -> impl Iterator<Item = &'a SweepPoint> {
+        let matches = move |point: &&SweepPoint| {
+            point.length == LENGTH && point.angle == ANGLE && point.order == order
+        };
+        self.0.iter().filter(matches)
+    }
+
+    /// Returns the point of the fastest affine column loop.
+    pub fn fastest_affine(self, order: Order) -> Option<&'a SweepPoint> {
+        let affine = self
+            .points(order)
+            .filter(|point| matches!(point.mapper, Mapper::Affine(_)));
+        affine.min_by(|a, b| a.cost.time.median.total_cmp(&b.cost.time.median))
+    }
+
+    /// Returns the median time of a mapper, if it was measured.
+    pub fn time(self, mapper: &str, order: Order) -> Option<f64> {
+        let mut points = self.points(order);
+        let point = points.find(|point| point.mapper.to_string() == mapper);
+        point.map(|point| point.cost.time.median)
+    }
+}
+
 /// The span lengths to sweep, at [`ANGLE`].
 pub const LENGTHS: [u16; 10] = [1, 2, 4, 8, 16, 32, 64, 120, 180, 240];
 /// The angles to sweep besides [`ANGLE`], with spans of [`LENGTH`].
@@ -621,7 +650,7 @@ mod tests {
     }
 
     #[test]
-    fn costs_are_of_every_mapper_in_every_order() {
+    fn every_mapper_has_a_cost_in_every_order() {
         with("tilted", 0, |workload| {
             let costs = measure(workload, 1, &some(), TINY);
             assert_eq!(costs.len(), 2 * some().len());
@@ -647,7 +676,7 @@ mod tests {
     /// Checks that the timed code draws the right pixels: mappers draw the renderer's frame, and bare loops
     /// draw as many pixels.
     #[test]
-    fn contestants_draw_whole_frames() {
+    fn every_contestant_draws_the_whole_frame() {
         with("tilted", 0, |workload| {
             let mappers = some();
             let faces = &workload.frames[1];

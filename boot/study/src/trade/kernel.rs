@@ -1,10 +1,8 @@
 //! The benchmark kernel's figures as a table, and the targets beside the measurements.
 
-use std::fmt::Display;
-
 use texmap::{Mapper, Order};
 
-use super::cost::{ANGLE, LENGTH, SweepPoint};
+use super::cost::{LongSpans, SweepPoint};
 use super::table::Table;
 use crate::measure::{Cpu, KernelFigures, KernelRow, TimeRatio};
 
@@ -94,26 +92,30 @@ pub fn targets(
         let target = format!("{bound} {target}");
         cells.push(vec![what.into(), target, measured, met.into()]);
     };
-    let host = Host { tables, sweep };
+    let spans = LongSpans(sweep);
+    let frame_time = |scene, mapper| frame_time(tables, scene, mapper);
     add(
         "best affine column loop by planes, over a bare load and store",
         1.15,
         true,
-        host.best(Order::Planes)
+        spans
+            .fastest_affine(Order::Planes)
             .map(|point| point.cost.to_bare.median),
     );
-    let best = host.best(Order::Planes).map(|point| point.cost.time.median);
+    let best = spans
+        .fastest_affine(Order::Planes)
+        .map(|point| point.cost.time.median);
     add(
         "`packed` by polygons over the best by planes",
         2.5,
         false,
-        over(host.time("packed", Order::Polygons), best),
+        over(spans.time("packed", Order::Polygons), best),
     );
     add(
         "`row-multiply` by polygons over the best by planes, in RAM",
         4.0,
         false,
-        over(host.time("row-multiply", Order::Polygons), best),
+        over(spans.time("row-multiply", Order::Polygons), best),
     );
     // Polygon by polygon, because plane by plane the mappers of rows do not draw rows as their names say.
     let screen = |cpu, mapper: fn(Mapper) -> bool| -> Option<f64> {
@@ -139,15 +141,15 @@ pub fn targets(
         "`linear-16` over the best affine loop, by planes",
         1.6,
         true,
-        over(host.time("linear-16", Order::Planes), best),
+        over(spans.time("linear-16", Order::Planes), best),
     );
     add(
         "`within-1/2` over `affine` on the ball, whole frames",
         1.25,
         true,
         over(
-            host.frame("ball", "within-1/2"),
-            host.frame("ball", "affine"),
+            frame_time("ball", "within-1/2"),
+            frame_time("ball", "affine"),
         ),
     );
     add(
@@ -155,8 +157,8 @@ pub fn targets(
         3.0,
         false,
         over(
-            host.frame("grazing-16", "exact"),
-            host.frame("grazing-16", "within-1/2"),
+            frame_time("grazing-16", "exact"),
+            frame_time("grazing-16", "within-1/2"),
         ),
     );
     let masks = |order| -> Option<f64> {
@@ -189,44 +191,9 @@ fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     Some(a? / b?)
 }
 
-/// The measurements in RAM.
-struct Host<'a> {
-    tables: &'a [Table],
-    sweep: &'a [SweepPoint],
-}
-
-impl Host<'_> {
-    /// Returns the measurements of an order on long spans.
-    fn long(&self, order: Order) -> impl Iterator<Item = &SweepPoint> {
-        let of = move |point: &&SweepPoint| {
-            point.length == LENGTH && point.angle == ANGLE && point.order == order
-        };
-        self.sweep.iter().filter(of)
-    }
-
-    /// Returns the affine column loop that is fastest on long spans.
-    fn best(&self, order: Order) -> Option<&SweepPoint> {
-        let affine = self
-            .long(order)
-            .filter(|point| matches!(point.mapper, Mapper::Affine(_)));
-        affine.min_by(|a, b| a.cost.time.median.total_cmp(&b.cost.time.median))
-    }
-
-    /// Returns a mapper's time on long spans.
-    fn time(&self, mapper: &str, order: Order) -> Option<f64> {
-        let point = self
-            .long(order)
-            .find(|point| point.mapper.to_string() == mapper);
-        point.map(|point| point.cost.time.median)
-    }
-
-    /// Returns the time of a scene's frame, in the cheaper of the orders.
-    fn frame(&self, scene: &str, mapper: impl Display) -> Option<f64> {
-        let table = self.tables.iter().find(|table| table.scene == scene)?;
-        let row = table
-            .rows
-            .iter()
-            .find(|row| row.name() == mapper.to_string())?;
-        Some(row.best().frame.time.median)
-    }
+/// Returns the time of a scene's frame in RAM, in the cheaper of the orders.
+fn frame_time(tables: &[Table], scene: &str, mapper: &str) -> Option<f64> {
+    let table = tables.iter().find(|table| table.scene == scene)?;
+    let row = table.rows.iter().find(|row| row.name() == mapper)?;
+    Some(row.best().frame.time.median)
 }
