@@ -17,22 +17,23 @@ use crate::commands::{
 
 /// Boots Crystal Ball: a textured solid that turns in VGA Mode X, on a machine without an operating system.
 ///
-/// The first run downloads a compiler, and QEMU if it is missing, into your cache folder, and shows each step. It
-/// installs nothing on the system. Press H in the window to see the keys. Close the window or press Ctrl-C to end the
-/// run. Without a display the program boots without a window, and writes a PNG of the running demo.
+/// The first run downloads a compiler, and QEMU if it is missing, into your cache folder, and shows each
+/// step. It installs nothing on the system. Press H in the window to see the keys. Close the window or press
+/// Ctrl-C to end the run. Without a display the program boots without a window, and writes a PNG of the
+/// running demo.
 #[derive(Debug, Parser)]
 #[command(version, after_help = AFTER_HELP)]
 pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Subcommands>,
     #[command(flatten)]
-    pub boot: Boot,
+    pub boot: BootOptions,
     #[command(flatten)]
     pub frame_options: FrameOptions,
     #[command(flatten)]
     pub model: Files,
     #[command(flatten)]
-    pub tools: Tools,
+    pub tools: ToolOptions,
     /// More arguments for QEMU; they follow `--`
     #[arg(last = true, value_name = "QEMU ARGUMENTS")]
     pub qemu_arguments: Vec<OsString>,
@@ -59,7 +60,7 @@ Exit codes: 0 success; 1 set-up failed, or a file could not be read or written; 
 16 serial line garbled; 17 the display adapter does not support Mode X; 130 ended by you.";
 
 #[derive(Debug, Args)]
-pub struct Boot {
+pub struct BootOptions {
     /// Boot without a window, write a PNG of the running demo, and print its path
     #[arg(long)]
     pub headless: bool,
@@ -69,7 +70,7 @@ pub struct Boot {
 }
 
 #[derive(Debug, Args)]
-pub struct Tools {
+pub struct ToolOptions {
     /// QEMU's program [default: qemu-system-x86_64 in PATH or in the cache folder]
     #[arg(long, global = true, value_name = "PATH")]
     pub qemu: Option<PathBuf>,
@@ -139,7 +140,7 @@ pub enum Subcommands {
     },
 }
 
-/// Returns the command line's definition. Global options are listed only in the help of the subcommands that use them.
+/// Returns the command line's definition. Help lists a global option only for the subcommands that use it.
 pub fn command() -> clap::Command {
     const FRAME: [&str; 3] = ["scene", "mapper", "order"];
     const MODEL: [&str; 2] = ["model", "texture"];

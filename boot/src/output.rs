@@ -23,8 +23,8 @@ impl Output {
 }
 
 impl Write for Output {
-    /// Writes bytes unchanged into a pipe or file. On a terminal, escape sequences (in a file's name, for example)
-    /// are shown and not obeyed.
+    /// Writes bytes unchanged into a pipe or file. On a terminal, escape sequences (in a file's name, for
+    /// example) are shown and not obeyed.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let mut out = io::stdout().lock();
         match std::str::from_utf8(bytes) {

@@ -1,8 +1,8 @@
 //! Reads dumps on the host, checks each line, and writes them again.
 //!
-//! [`protocol::dump`] defines the format. The reader trusts nothing: each line must have a correct checksum and
-//! the expected label, and the last line's count and checksum must match the lines before it. So a missing,
-//! repeated or misplaced line is reported by its number.
+//! [`protocol::dump`] defines the format. The reader trusts nothing: each line must have a correct checksum
+//! and the expected label, and the last line's count and checksum must match the lines before it. So a
+//! missing, repeated or misplaced line is reported by its number.
 
 use std::fmt;
 use std::io::{self, Write};

@@ -8,9 +8,9 @@
 //! mapper = "linear-16"      # may be left out, as may be `scene` and `order`
 //! ```
 //!
-//! `NAME.png` is the last of the frames in `show`, as an indexed PNG. The folder is the list of goldens, so no
-//! golden can be forgotten: a PNG without a description is an error, and a description without a PNG fails
-//! its check.
+//! `NAME.png` is the last of the frames in `show`, as an indexed PNG. The folder is the list of goldens, so
+//! no golden can be forgotten: a PNG without a description is an error, and a description without a PNG
+//! fails its check.
 //!
 //! QEMU's VGA, the emulated VGA, the PNG and QEMU's screen must agree:
 //!

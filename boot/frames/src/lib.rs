@@ -1,7 +1,7 @@
 //! Frames on the host: drawing them on a VGA, dumps, PNGs, comparison, golden frames, recordings.
 //!
-//! Nothing here starts QEMU. Functions that need a VGA are generic over [`backend::Backend`], which QEMU's VGA
-//! and the emulated VGA implement.
+//! Nothing here starts QEMU. Functions that need a VGA are generic over [`backend::Backend`], which QEMU's
+//! VGA and the emulated VGA implement.
 //!
 //! This example reads two dumps and compares them:
 //!

@@ -16,7 +16,7 @@ Examples:
   cargo run -- diff a/frame-000000.dump a/frame-000001.dump
                                                 two files";
 
-/// Compares two files or folders. As for the system's `diff` and `cmp`, exit code 1 means a difference, and 2 an error.
+/// Compares two files or folders. Exit code 1 means a difference and 2 an error, as for the system's `diff`.
 pub fn run(a: &Path, b: &Path, report: Option<&Path>) -> anyhow::Result<ExitCode> {
     let outcome = match comparison::run(a, b, report, &mut Output) {
         Err(error) if !error.is::<Interrupted>() => {

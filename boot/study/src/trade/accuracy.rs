@@ -9,7 +9,7 @@ use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use texmap::plane::{Plane, texel};
 use texmap::{JobList, Mapper, Order, Renderer, Texture};
 
-use super::stats::{Errors, psnr};
+use super::stats::{ErrorHistogram, psnr};
 use super::workload::{OwnedFace, Workload};
 
 /// The jobs of a whole frame.
@@ -19,7 +19,7 @@ pub type FrameJobs = JobList<{ scene::MAX_JOBS }>;
 #[derive(Clone, Debug, Default)]
 pub struct Accuracy {
     /// The errors of all pixels, in texels.
-    pub errors: Errors,
+    pub errors: ErrorHistogram,
     /// The number of pixels whose texel is not the exact mapper's.
     pub other_texels: u64,
     /// The peak signal-to-noise ratio of a whole frame against the exact mapper's, in decibels: the worst of

@@ -95,7 +95,7 @@ pub fn all(
     };
     vec![
         Claim {
-            source: "57, listing 57.2",
+            source: "chapter 57, listing 57.2",
             claimed: "more than twice as fast as listing 57.1",
             measured: ratio(("row-multiply", Polygons), ("row-steps", Polygons)),
             why: "A multiplication cost 13 to 42 cycles; now it costs 3, and overlaps with other \
@@ -103,7 +103,7 @@ pub fn all(
                   listings select the plane for every pixel.",
         },
         Claim {
-            source: "58, of listing 58.1",
+            source: "chapter 58, on listing 58.1",
             claimed: "nearly 10 % from unrolling",
             measured: format!(
                 "{:.1} % from unrolling a loop of shifts and masks eight times",
@@ -113,7 +113,7 @@ pub fn all(
                   own bookkeeping.",
         },
         Claim {
-            source: "58, listing 58.2",
+            source: "chapter 58, listing 58.2",
             claimed: "columns 2 to 4 times as fast as rows",
             measured: format!(
                 "{} by polygons, {} with both by planes",
@@ -125,7 +125,7 @@ pub fn all(
                   one for each pixel.",
         },
         Claim {
-            source: "58, at the end",
+            source: "chapter 58, at the end",
             claimed: "5 to 10 times as fast in all",
             measured: format!(
                 "{} from `row-steps` to `packed`, by polygons{best}",
@@ -134,7 +134,7 @@ pub fn all(
             why: "Drawing plane by plane now gains what the loop gained then.",
         },
         Claim {
-            source: "58, of John Miles's loop",
+            source: "chapter 58, on John Miles's loop",
             claimed: "a table of two steps costs half a cycle to one more than the branch",
             measured: two_steps,
             why: "Carries follow a regular pattern, which today's branch predictors learn: then the \
@@ -142,7 +142,7 @@ pub fn all(
                   cycles, and the table none.",
         },
         Claim {
-            source: "58, listing 58.3",
+            source: "chapter 58, listing 58.3",
             claimed: "packed fractions: from 22 cycles to 10, and 9 without a segment prefix",
             measured: format!(
                 "{} from `two-carries` to `packed` ({} {unit}) by polygons, {} ({}) by planes",

@@ -66,7 +66,7 @@ impl Drawer {
     }
 }
 
-type Key = (Drawer, Order, Scope);
+type ContestantKey = (Drawer, Order, Scope);
 
 /// The memory that drawing needs.
 struct DrawMemory {
@@ -74,12 +74,12 @@ struct DrawMemory {
     jobs: Box<FrameJobs>,
 }
 
-type Draw<'a> = Box<dyn Fn(&mut DrawMemory) + 'a>;
+type DrawFn<'a> = Box<dyn Fn(&mut DrawMemory) + 'a>;
 
 struct Contestant<'a> {
-    key: Key,
+    key: ContestantKey,
     pixels: u64,
-    draw: Draw<'a>,
+    draw: DrawFn<'a>,
 }
 
 /// Returns the mapper's loop, if this CPU runs it with instructions that not every CPU of its architecture
@@ -326,7 +326,7 @@ fn contestants<'a>(
         for order in ORDERS {
             for &scope in scope {
                 let (jobs, pixels) = in_order(order, jobs(mapper, faces, workload));
-                let draw: Draw<'a> = match scope {
+                let draw: DrawFn<'a> = match scope {
                     Scope::Loops => Box::new(move |arena| {
                         draw(&jobs, mapper, order, &workload.textures, &mut arena.page);
                     }),
@@ -387,10 +387,10 @@ fn ratio(times: &[f64], others: &[f64]) -> Spread {
 }
 
 /// The times of a race, by contestant.
-struct Times(Vec<(Key, Vec<f64>)>);
+struct Times(Vec<(ContestantKey, Vec<f64>)>);
 
 impl Times {
-    fn of(&self, key: Key) -> Option<&[f64]> {
+    fn of(&self, key: ContestantKey) -> Option<&[f64]> {
         let found = self.0.iter().find(|(known, _)| *known == key);
         found.map(|(_, times)| &times[..])
     }
@@ -400,7 +400,7 @@ impl Times {
         cost.expect("it took part")
     }
 
-    fn cost_of(&self, key: Key, bare: Drawer) -> Option<PixelCost> {
+    fn cost_of(&self, key: ContestantKey, bare: Drawer) -> Option<PixelCost> {
         let (_, order, scope) = key;
         let times = self.of(key)?;
         let to = |key| match self.of(key) {

@@ -73,7 +73,7 @@ const OCTAVES: std::ops::Range<i32> = -20..9;
 
 /// A histogram of errors, so that the errors of many frames fit into memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Errors {
+pub struct ErrorHistogram {
     /// The number of errors in each class, the smallest errors first. Errors below all classes count in the
     /// first class.
     classes: Vec<u32>,
@@ -82,7 +82,7 @@ pub struct Errors {
     largest: f64,
 }
 
-impl Default for Errors {
+impl Default for ErrorHistogram {
     fn default() -> Self {
         Self {
             classes: vec![0; (OCTAVES.len() as i32 * CLASSES) as usize],
@@ -93,7 +93,7 @@ impl Default for Errors {
     }
 }
 
-impl Errors {
+impl ErrorHistogram {
     /// Adds an error.
     pub fn add(&mut self, error: f64) {
         let above = (error.log2() - f64::from(OCTAVES.start)) * f64::from(CLASSES);
@@ -215,13 +215,13 @@ mod tests {
     fn percentiles_equal_those_of_the_sorted_list_within_a_class() {
         let mut random = seeded::generator();
         for _ in 0..50 {
-            let mut errors = Errors::default();
+            let mut errors = ErrorHistogram::default();
             let count = random.usize(1..2000);
             let mut list: Vec<f64> = (0..count)
                 .map(|_| (random.f64() * 26.0 - 18.0).exp2())
                 .collect();
             // Two histograms, joined.
-            let mut second = Errors::default();
+            let mut second = ErrorHistogram::default();
             let half = random.usize(..=count);
             list[..half].iter().for_each(|&error| errors.add(error));
             list[half..].iter().for_each(|&error| second.add(error));
@@ -245,7 +245,7 @@ mod tests {
 
     #[test]
     fn errors_outside_all_classes_are_counted() {
-        let mut errors = Errors::default();
+        let mut errors = ErrorHistogram::default();
         assert_eq!((errors.mean(), errors.percentile(0.99)), (0.0, 0.0));
         errors.add(0.0);
         assert_eq!((errors.largest(), errors.percentile(1.0)), (0.0, 0.0));
