@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use frames::card::{self, Card, Emulated};
+use frames::backend::{self, Backend, EmulatedDemo};
 use modex::registers::MODE_X;
 use protocol::{Action, Change, Command, Content, FailKind, FrameName};
 use qemu::{Config, Limits, Machine, Verdict};
@@ -46,8 +46,8 @@ fn short() -> Limits {
 #[test]
 fn the_registers_read_back_as_the_table_says() {
     let mut machine = boot();
-    machine.ask(Command::Show(FrameName::Number(0))).unwrap();
-    let answer = machine.ask(Command::Registers).unwrap();
+    machine.send(Command::Show(FrameName::Number(0))).unwrap();
+    let answer = machine.send(Command::Registers).unwrap();
     for ((block, expected), line) in MODE_X.blocks().into_iter().zip(&answer) {
         let (name, values) = line.split_once(' ').unwrap();
         assert_eq!(name, block);
@@ -72,7 +72,7 @@ fn the_registers_read_back_as_the_table_says() {
 
 /// Returns the frames shown, late frames and ticks of the running demo, or `None` if the demo is held.
 fn pace(machine: &mut Machine) -> Option<[u32; 3]> {
-    let counts = machine.ask(Command::Counts).unwrap();
+    let counts = machine.send(Command::Counts).unwrap();
     let pace = counts.iter().find(|line| line.starts_with("pace "))?;
     let words: Vec<_> = pace.split(' ').collect();
     Some([words[2], words[4], words[6]].map(|number| number.parse().unwrap()))
@@ -126,12 +126,12 @@ fn the_running_show_paces_itself_and_can_be_held() {
         "no second of twenty had its ticks and frames, though nothing disturbed {undisturbed} of them"
     );
 
-    machine.ask(Command::Hold).unwrap();
+    machine.send(Command::Hold).unwrap();
     assert_eq!(pace(&mut machine), None);
     let still = machine.screen().unwrap();
     machine.rest(Duration::from_millis(300)).unwrap();
     assert!(still == machine.screen().unwrap(), "the held frame changed");
-    machine.ask(Command::Run).unwrap();
+    machine.send(Command::Run).unwrap();
     machine.wait_until_running().unwrap();
     machine.leave().unwrap();
 }
@@ -142,7 +142,7 @@ fn logged(machine: &mut Machine, change: &str, press: impl Fn(&mut Machine)) -> 
     for _ in 0..600 {
         press(machine);
         machine.rest(Duration::from_millis(50)).unwrap();
-        let log = machine.ask(Command::Log).unwrap();
+        let log = machine.send(Command::Log).unwrap();
         if log.iter().any(|line| line.ends_with(change)) {
             return log;
         }
@@ -172,7 +172,7 @@ fn a_steered_show_is_brought_back_by_its_log() {
     });
     let steer = |name: &str| Command::Steer(None, Change::Act(name.parse::<Action>().unwrap()));
     for name in ["next-scene", "pitch-up", "coarser"] {
-        machine.ask(steer(name)).unwrap();
+        machine.send(steer(name)).unwrap();
         machine.rest(Duration::from_millis(100)).unwrap();
     }
     // Without a release a second press is a repeat, which does not end the pause.
@@ -202,15 +202,15 @@ fn a_steered_show_is_brought_back_by_its_log() {
     let screen = machine.screen().unwrap();
     assert!(shown.header.frame.unwrap().to_string().starts_with("pose "));
 
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
-    let cards: [&mut dyn Card; 2] = [&mut machine, &mut emulated];
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
+    let cards: [&mut dyn Backend; 2] = [&mut machine, &mut emulated];
     for card in cards {
-        card.ask(Command::Hold).unwrap();
+        card.send(Command::Hold).unwrap();
         for line in &log {
-            card.ask(Command::parse(line).unwrap()).unwrap();
+            card.send(Command::parse(line).unwrap()).unwrap();
         }
-        card.ask(Command::ShowAt(paused)).unwrap();
+        card.send(Command::ShowAt(paused)).unwrap();
         let again = card.dump(Content::Page).unwrap();
         assert_eq!(
             (again.header.scene, again.header.mapper),
@@ -230,7 +230,7 @@ fn failure(kind: FailKind) -> Judged {
 
 fn failure_within(limits: Limits, kind: FailKind) -> Judged {
     let mut machine = boot_with(&[], limits);
-    let judged = Judged(verdict(machine.ask(Command::Fail(kind))));
+    let judged = Judged(verdict(machine.send(Command::Fail(kind))));
     let evidence = judged.0.evidence.as_deref().expect("evidence is kept");
     for name in ["command.txt", "serial.log", "screen.png"] {
         let there = evidence.join(name).exists();
@@ -288,7 +288,7 @@ fn a_reboot_loop_is_noticed() {
     let mut config = config();
     config.arguments = vec!["-action".into(), "reboot=reset".into()];
     let mut machine = Machine::boot(&config).unwrap();
-    let judged = Judged(verdict(machine.ask(Command::Fail(FailKind::TripleFault))));
+    let judged = Judged(verdict(machine.send(Command::Fail(FailKind::TripleFault))));
     assert_eq!(judged.0.verdict, Verdict::TripleFault { booted: true });
 }
 
@@ -389,7 +389,7 @@ fn a_paused_machine_does_not_hang() {
         monitor.write_all(b"cont\n").unwrap();
         monitor
     });
-    machine.ask(Command::Hold).unwrap();
+    machine.send(Command::Hold).unwrap();
     assert!(
         resume.is_finished(),
         "the answer came while the machine stood still"
@@ -403,7 +403,7 @@ fn a_pause_is_not_waited_for_without_end() {
     let (mut machine, mut monitor) = boot_with_monitor(Limits { pause, ..short() });
     monitor.write_all(b"stop\n").unwrap();
     machine.rest(Duration::from_secs(1)).unwrap();
-    let judged = Judged(verdict(machine.ask(Command::Hold)));
+    let judged = Judged(verdict(machine.send(Command::Hold)));
     let waited_for = "the answer to 'hold'".into();
     assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
 }
@@ -560,7 +560,7 @@ fn without_a_display_a_frame_is_left_and_so_by_a_second_one_beside_it() {
     let [ball, cube] = both.map(|output| {
         let words = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{words}");
-        assert!(words.contains("there is no display"), "{words}");
+        assert!(words.contains("no display: "), "{words}");
         String::from_utf8(output.stdout).unwrap()
     });
     assert!(
@@ -580,15 +580,15 @@ fn without_a_display_a_frame_is_left_and_so_by_a_second_one_beside_it() {
             (640, 480, 3 * 640)
         );
         // The screen shows the frame of a tick in the first minute, from edge to edge.
-        let mut memory = card::memory();
-        let mut emulated = Emulated::new(&mut memory).unwrap();
-        emulated.ask(Command::Hold).unwrap();
+        let mut memory = backend::memory();
+        let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
+        emulated.send(Command::Hold).unwrap();
         for command in look {
-            emulated.ask(Command::parse(command).unwrap()).unwrap();
+            emulated.send(Command::parse(command).unwrap()).unwrap();
         }
         let mut is_of = |frame| {
             emulated
-                .ask(Command::Show(FrameName::Number(frame)))
+                .send(Command::Show(FrameName::Number(frame)))
                 .unwrap();
             emulated.screen().unwrap().pixels.as_flattened() == bytes
         };

@@ -22,7 +22,7 @@ const AFFINE_BITS: u32 = 7;
 
 /// A golden's scene.
 fn scene(golden: &Golden) -> &'static Entry<'static> {
-    let scene = golden.look.scene.and_then(|scene| Entry::parse(scene.0));
+    let scene = golden.options.scene.and_then(Entry::parse);
     scene.unwrap_or(&CATALOGUE[0])
 }
 
@@ -174,7 +174,7 @@ fn every_golden_is_what_the_oracle_draws() {
         // The committed PNG.
         let frame = golden.frame().unwrap().expect("it was blessed");
         let affine = expected(&mut stage, &pose, Mapper::default());
-        let mapper = golden.look.mapper.unwrap_or_default();
+        let mapper = golden.options.mapper.unwrap_or_default();
         let background = stage.background();
         match mapper {
             // This loop's fractions are shorter.

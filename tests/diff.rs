@@ -6,10 +6,9 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 use frames::dump::Dump;
-use frames::indexed::Indexed;
-use frames::screen::Screen;
-use protocol::dump::{Header, PLANE_BYTES};
-use protocol::{Content, FrameName, Word};
+use frames::indexed::IndexedImage;
+use frames::rgb::RgbImage;
+use protocol::Content;
 use tempfile::TempDir;
 
 /// A folder of files to compare; the program runs in it.
@@ -35,7 +34,7 @@ impl World {
         String::from_utf8(fs::read(self.path(name)).unwrap()).unwrap()
     }
 
-    fn diff(&self, arguments: &[&str]) -> Said {
+    fn diff(&self, arguments: &[&str]) -> Exit {
         let mut program = Command::new(env!("CARGO_BIN_EXE_crystal-ball"));
         program.arg("diff").args(arguments).stdin(Stdio::null());
         let Output {
@@ -43,7 +42,7 @@ impl World {
             stdout,
             stderr,
         } = program.current_dir(self.0.path()).output().unwrap();
-        Said {
+        Exit {
             code: status.code(),
             out: String::from_utf8(stdout).unwrap(),
             errors: String::from_utf8(stderr).unwrap(),
@@ -53,42 +52,20 @@ impl World {
 
 /// The program's exit code and output.
 #[derive(Debug, PartialEq, Eq)]
-struct Said {
+struct Exit {
     code: Option<i32>,
     out: String,
     errors: String,
 }
 
 #[track_caller]
-fn says(said: Said, code: i32, out: &str, errors: &str) {
-    let expected = Said {
+fn check(exit: Exit, code: i32, out: &str, errors: &str) {
+    let expected = Exit {
         code: Some(code),
         out: out.into(),
         errors: errors.into(),
     };
-    assert_eq!(said, expected);
-}
-
-fn dump(content: Content) -> Dump {
-    let pixels = match content {
-        Content::Page => 320 * 240,
-        Content::Memory => 4 * PLANE_BYTES,
-    };
-    Dump {
-        header: Header {
-            content,
-            scene: "ball".into(),
-            model_file: None,
-            mapper: Word::new("exact"),
-            frame: Some(FrameName::Number(480)),
-            motion: None,
-            start: 0x4B00,
-            width: 320,
-            height: 240,
-        },
-        palette: std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8]),
-        pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
-    }
+    assert_eq!(exit, expected);
 }
 
 /// A page's dump as a file, after `change`.
@@ -97,15 +74,15 @@ fn page(change: impl FnOnce(&mut Dump)) -> Vec<u8> {
 }
 
 fn file(content: Content, change: impl FnOnce(&mut Dump)) -> Vec<u8> {
-    let (mut dump, mut bytes) = (dump(content), Vec::new());
+    let (mut dump, mut bytes) = (Dump::example(content), Vec::new());
     change(&mut dump);
     dump.write(&mut bytes).unwrap();
     bytes
 }
 
 /// A PNG as a file, after `change`.
-fn png(change: impl FnOnce(&mut Indexed)) -> Vec<u8> {
-    let (mut frame, mut bytes) = (dump(Content::Page).frame(), Vec::new());
+fn png(change: impl FnOnce(&mut IndexedImage)) -> Vec<u8> {
+    let (mut frame, mut bytes) = (Dump::example(Content::Page).frame(), Vec::new());
     change(&mut frame);
     frame.write_png(&mut bytes).unwrap();
     bytes
@@ -118,7 +95,7 @@ fn one_pixel(dump: &mut Dump) {
 }
 
 #[test]
-fn equal_files_are_equal() {
+fn equal_files_have_exit_code_0() {
     let world = World::new();
     world.put("a.dump", page(|_| {}));
     // With the line ends of a terminal.
@@ -133,12 +110,12 @@ fn equal_files_are_equal() {
         ("all.dump", "all.dump", 262_144),
     ] {
         let line = format!("equal: {a} and {b}, {pixels} pixels\n");
-        says(world.diff(&[a, b]), 0, &line, "");
+        check(world.diff(&[a, b]), 0, &line, "");
     }
 }
 
 #[test]
-fn what_differs_is_told_in_a_line() {
+fn a_difference_is_described_in_one_line() {
     let world = World::new();
     world.put("a", page(|_| {}));
     world.put("pixel", page(one_pixel));
@@ -168,12 +145,12 @@ fn what_differs_is_told_in_a_line() {
         ),
     ] {
         let line = format!("{b} differs from {a}: {line}\n");
-        says(world.diff(&[a, b]), 1, &line, "");
+        check(world.diff(&[a, b]), 1, &line, "");
     }
 }
 
 #[test]
-fn folders_are_matched_by_name_and_all_of_it_is_told() {
+fn folders_are_matched_by_name_and_every_pair_is_reported() {
     let world = World::new();
     for folder in ["a", "b"] {
         world.put(&format!("{folder}/1.dump"), page(|_| {}));
@@ -182,44 +159,44 @@ fn folders_are_matched_by_name_and_all_of_it_is_told() {
         world.put(&format!("{folder}/sub/{folder}.dump"), "not compared");
     }
     let equal = "equal: 2 pairs, 153600 pixels\n";
-    says(world.diff(&["a", "b"]), 0, equal, "");
+    check(world.diff(&["a", "b"]), 0, equal, "");
     world.put("b/2.png", png(|frame| frame.pixels[321] ^= 1));
     let different = format!("2.png differs: {FIRST}\n1 of 2 pairs differs\n");
-    says(world.diff(&["a", "b/"]), 1, &different, "");
+    check(world.diff(&["a", "b/"]), 1, &different, "");
     // Missing files are reported first, and the rest is compared nevertheless.
     world.put("a/0.dump", page(|_| {}));
     world.put("b/1.png", png(|_| {}));
-    says(
+    check(
         world.diff(&["a", "b"]),
         2,
         &format!("2.png differs: {FIRST}\n1 of 4 pairs differs, 2 could not be compared\n"),
-        "error: 0.dump is in a, b lacks it\nerror: 1.png is in b, a lacks it\n",
+        "error: 0.dump: in a, but missing from b\nerror: 1.png: in b, but missing from a\n",
     );
 }
 
 #[test]
-fn nothing_to_compare_is_not_equal() {
+fn a_comparison_without_files_is_an_error() {
     let world = World::new();
     world.put("a/x.txt", "");
     world.put("b/x.txt", "");
-    says(
+    check(
         world.diff(&["a", "b"]),
         2,
         "",
-        "error: there is nothing to compare: no .dump and no .png in a and b\n",
+        "error: a and b: neither folder has a .dump or a .png file to compare\n",
     );
     world.put("file", page(|_| {}));
-    let why = "error: a is a folder and file is none; give two files or two folders\n";
-    says(world.diff(&["a", "file"]), 2, "", why);
-    says(world.diff(&["file", "a"]), 2, "", why);
-    let gone = "error: gone: it cannot be read: No such file or directory (os error 2)\n";
-    says(world.diff(&["a", "gone"]), 2, "", gone);
-    says(world.diff(&["gone", "a"]), 2, "", gone);
+    let why = "error: a is a folder, file is a file; give two files or two folders\n";
+    check(world.diff(&["a", "file"]), 2, "", why);
+    check(world.diff(&["file", "a"]), 2, "", why);
+    let gone = "error: gone: cannot be read: No such file or directory (os error 2)\n";
+    check(world.diff(&["a", "gone"]), 2, "", gone);
+    check(world.diff(&["gone", "a"]), 2, "", gone);
     assert_eq!(world.diff(&["a"]).code, Some(2), "wrong usage");
 }
 
 #[test]
-fn what_cannot_be_compared_is_told_with_words() {
+fn files_that_cannot_be_compared_are_an_error_with_the_reason() {
     let world = World::new();
     world.put("a", page(|_| {}));
     world.put("all", file(Content::Memory, |_| {}));
@@ -233,25 +210,26 @@ fn what_cannot_be_compared_is_told_with_words() {
     world.put("a.png", png(|_| {}));
     world.put("order.png", png(|frame| frame.palette.swap(3, 200)));
     let order = "the palettes hold the same colours in another order (entry 03: expected 000303, \
-                 got 320800); indices can't be compared";
+                 got 320800), so indices cannot be compared; give the PNG as this program wrote it";
+    let size = "expected is 320 x 240 pixels, got is 320 x 200; both must have the same size";
     for (a, b, why) in [
         (
             "a",
             "all",
-            "expected is a dump of a page, got one of all memory; take both alike",
+            "expected is a dump of a page, got a dump of all memory; take both with --all or both without",
         ),
-        ("a", "low", "expected is 320 x 240, got 320 x 200"),
-        ("a.png", "low", "expected is 320 x 240, got 320 x 200"),
+        ("a", "low", size),
+        ("a.png", "low", size),
         ("a.png", "order.png", order),
         ("a", "order.png", order),
     ] {
-        let error = format!("error: {a} and {b} can't be compared: {why}\n");
-        says(world.diff(&[a, b]), 2, "", &error);
+        let error = format!("error: {a} and {b} cannot be compared: {why}\n");
+        check(world.diff(&[a, b]), 2, "", &error);
     }
 }
 
 #[test]
-fn files_that_are_no_dumps_or_frames_are_told_apart() {
+fn a_file_that_is_not_a_valid_dump_or_png_is_an_error_with_the_reason() {
     let world = World::new();
     let good = String::from_utf8(page(|_| {})).unwrap();
     let lines: Vec<_> = good.split_inclusive('\n').collect();
@@ -270,43 +248,43 @@ fn files_that_are_no_dumps_or_frames_are_told_apart() {
     checksum.add(&huge[12..29]);
     huge[29..33].copy_from_slice(&checksum.value().to_be_bytes());
     let mut rgb = Vec::new();
-    let screen = Screen {
+    let screen = RgbImage {
         width: 1,
         height: 1,
         pixels: vec![[1, 2, 3]],
     };
     screen.write_png(&mut rgb).unwrap();
-    let no_dump = "nor is it a PNG; `diff` compares dumps and indexed PNGs";
-    for (name, bytes, words) in [
-        ("empty", Vec::new(), ["line 1: it is no dump", no_dump]),
+    let not_a_png = "and not a PNG; give a dump or an indexed PNG";
+    for (name, bytes, parts) in [
+        ("empty", Vec::new(), ["line 1: not a dump", not_a_png]),
         (
             "text",
             b"Hello!\n".to_vec(),
-            ["line 1: it is no dump", no_dump],
+            ["line 1: not a dump", not_a_png],
         ),
         (
             "binary",
             (0..=255).cycle().take(99_999).collect(),
-            ["line 1: it is no dump", no_dump],
+            ["line 1: not a dump", not_a_png],
         ),
         (
             "later",
-            good.replacen(lines[0], &framed("crystal-ball dump 5"), 1)
+            good.replacen(lines[0], &framed("crystal-ball dump 6"), 1)
                 .into(),
             [
-                "line 1: it is a dump of version 5; this program reads versions 3 to 4",
+                "line 1: dump version 6 is not supported; this program reads versions 3 to 5",
                 "take the dump again",
             ],
         ),
         (
             "cut",
             lines[..100].concat().into(),
-            ["line 101: it is cut short", "take the dump again"],
+            ["line 101: the dump is cut short", "take the dump again"],
         ),
         (
             "cut in a line",
             good[..99_999].into(),
-            ["line 173: it is cut short", "take the dump again"],
+            ["line 173: the dump is cut short", "take the dump again"],
         ),
         (
             "edited",
@@ -316,38 +294,45 @@ fn files_that_are_no_dumps_or_frames_are_told_apart() {
         (
             "cut.png",
             frame[..frame.len() / 2].into(),
-            ["it is no whole PNG", ""],
+            ["the PNG is damaged or cut short", ""],
         ),
         (
             "end.png",
             frame[..frame.len() - 12].into(),
-            ["it is no whole PNG", ""],
+            ["the PNG is damaged or cut short", ""],
         ),
-        ("head.png", frame[..20].into(), ["it is no whole PNG", ""]),
+        (
+            "head.png",
+            frame[..20].into(),
+            ["the PNG is damaged or cut short", ""],
+        ),
         (
             "rgb.png",
             rgb,
             [
-                "its pixels are Rgb of Eight bits, not indices",
-                "this program's own PNGs",
+                "the PNG has Rgb pixels of 8 bits",
+                "give an indexed PNG of 8 bits, as this program writes",
             ],
         ),
         (
             "huge.png",
             huge,
-            ["its header claims 2147483647 x 2147483647 pixels", ""],
+            [
+                "the PNG's header claims 2147483647 x 2147483647 pixels; the limit is 16777216",
+                "",
+            ],
         ),
     ] {
         world.put(name, bytes);
         world.put("good", &good);
         for arguments in [[name, "good"], ["good", name]] {
-            let said = world.diff(&arguments);
-            assert_eq!((said.code, said.out.as_str()), (Some(2), ""), "{said:?}");
+            let exit = world.diff(&arguments);
+            assert_eq!((exit.code, exit.out.as_str()), (Some(2), ""), "{exit:?}");
             let begin = format!("error: {name}: ");
-            assert!(said.errors.starts_with(&begin), "{said:?}");
-            assert_eq!(said.errors.lines().count(), 1, "{said:?}");
-            for words in words {
-                assert!(said.errors.contains(words), "{words}: {said:?}");
+            assert!(exit.errors.starts_with(&begin), "{exit:?}");
+            assert_eq!(exit.errors.lines().count(), 1, "{exit:?}");
+            for part in parts {
+                assert!(exit.errors.contains(part), "{part}: {exit:?}");
             }
         }
     }
@@ -355,26 +340,26 @@ fn files_that_are_no_dumps_or_frames_are_told_apart() {
     let both = world.diff(&["gone", "text"]);
     assert!(
         both.errors
-            .starts_with("error: gone: it cannot be read: No such file")
+            .starts_with("error: gone: cannot be read: No such file")
     );
     assert!(both.errors.contains("\nerror: text: line 1: "), "{both:?}");
     let endless = world.diff(&["good", "/dev/zero"]);
     assert_eq!(endless.code, Some(2));
     assert!(
-        endless.errors.contains("/dev/zero: it has more than"),
+        endless.errors.contains("/dev/zero: the file has more than"),
         "{endless:?}"
     );
     fs::create_dir_all(world.path("x/1.dump")).unwrap();
     let folder = world.diff(&["x", "x"]);
     assert_eq!(folder.code, Some(2));
     assert!(
-        folder.errors.contains("x/1.dump: it cannot be read"),
+        folder.errors.contains("x/1.dump: cannot be read"),
         "{folder:?}"
     );
 }
 
 #[test]
-fn the_report_shows_every_pair_that_differs() {
+fn a_report_shows_every_pair_that_differs() {
     let world = World::new();
     for (name, got) in [
         ("1.dump", page(one_pixel)),
@@ -393,26 +378,26 @@ fn the_report_shows_every_pair_that_differs() {
     world.put("a/5.png", png(|_| {}));
     world.put("b/5.png", png(|frame| frame.pixels.fill(7)));
     world.put("a/6.dump", page(|_| {}));
-    let said = world.diff(&["a", "b", "--report", "it differs.html"]);
-    assert_eq!(said.code, Some(2));
+    let exit = world.diff(&["a", "b", "--report", "it differs.html"]);
+    assert_eq!(exit.code, Some(2));
     assert!(
-        said.out
+        exit.out
             .ends_with("4 of 6 pairs differ, 1 could not be compared\n")
     );
     assert!(
-        said.errors.ends_with("\nthe report: it differs.html\n"),
-        "{said:?}"
+        exit.errors.ends_with("\nreport: it differs.html\n"),
+        "{exit:?}"
     );
     let html = world.read("it differs.html");
-    for words in [
+    for part in [
         "<h1>4 of 6 pairs differ, 1 could not be compared</h1>",
         FIRST,
-        "6.dump is in a, b lacks it",
+        "6.dump: in a, but missing from b",
         "&lt;3&gt;.dump",
         "All of video memory",
         "<td class=\"n\">1</td>",
     ] {
-        assert!(html.contains(words), "{words}");
+        assert!(html.contains(part), "{part}");
     }
     assert!(!html.contains("<3>") && !html.contains("2.dump"));
     let mut expected = Vec::new();
@@ -440,7 +425,7 @@ fn the_report_shows_every_pair_that_differs() {
         let copy = world.read(&format!("it differs-files/1.dump-{of}.dump"));
         assert!(copy == world.read(&format!("{folder}/1.dump")));
         let shown = fs::read(world.path(&format!("it differs-files/1.dump-{of}.png"))).unwrap();
-        let shown = Indexed::read_png(Cursor::new(shown)).unwrap();
+        let shown = IndexedImage::read_png(Cursor::new(shown)).unwrap();
         assert!(shown == Dump::read(copy.as_bytes()).unwrap().frame());
     }
     let difference = decode(&world.path("it differs-files/1.dump-difference.png"));
@@ -467,43 +452,43 @@ fn decode(path: &Path) -> Vec<[u8; 3]> {
 fn a_report_of_equal_files_says_so_and_has_no_folder() {
     let world = World::new();
     world.put("a.png", png(|_| {}));
-    let said = world.diff(&["a.png", "a.png", "--report", "r.html"]);
-    assert_eq!(said.code, Some(0), "{said:?}");
+    let exit = world.diff(&["a.png", "a.png", "--report", "r.html"]);
+    assert_eq!(exit.code, Some(0), "{exit:?}");
     assert!(world.read("r.html").contains("<h1>Nothing differs</h1>"));
     assert!(!world.path("r-files").exists());
     // A report about files that could not be compared does not claim that nothing differs.
-    let said = world.diff(&["a.png", "gone", "--report", "r.html"]);
-    assert_eq!(said.code, Some(2), "{said:?}");
+    let exit = world.diff(&["a.png", "gone", "--report", "r.html"]);
+    assert_eq!(exit.code, Some(2), "{exit:?}");
     let html = world.read("r.html");
     assert!(!html.contains("Nothing differs") && html.contains("No such file"));
 }
 
 #[test]
-fn a_report_that_cannot_be_written_is_an_error_after_the_findings() {
+fn a_report_that_cannot_be_written_is_an_error_after_the_differences() {
     let world = World::new();
     world.put("a", page(|_| {}));
     world.put("b", page(one_pixel));
     world.put("blocked-files", "a file where the folder should be");
     fs::create_dir(world.path("folder.html")).unwrap();
-    for (report, words) in [
+    for (report, start) in [
         (
             "nowhere/r.html",
-            "error: the folder nowhere/r-files cannot be made: No such",
+            "error: nowhere/r-files: the folder cannot be created: No such",
         ),
         (
             "blocked.html",
-            "error: the folder blocked-files cannot be made: File exists",
+            "error: blocked-files: the folder cannot be created: File exists",
         ),
         (
             "folder.html",
             "error: folder.html cannot be written: Is a directory",
         ),
-        ("..", "error: .. is no name for a report"),
+        ("..", "error: --report ..: not a file name"),
     ] {
-        let said = world.diff(&["a", "b", "--report", report]);
-        assert_eq!(said.code, Some(2), "{said:?}");
-        assert_eq!(said.out, format!("b differs from a: {FIRST}\n"));
-        assert!(said.errors.starts_with(words), "{said:?}");
+        let exit = world.diff(&["a", "b", "--report", report]);
+        assert_eq!(exit.code, Some(2), "{exit:?}");
+        assert_eq!(exit.out, format!("b differs from a: {FIRST}\n"));
+        assert!(exit.errors.starts_with(start), "{exit:?}");
     }
     assert!(!world.path("blocked.html").exists());
     let equal = world.diff(&["a", "a", "--report", "nowhere/r.html"]);

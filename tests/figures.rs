@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crystal_ball::golden_folder;
-use frames::card::{self, Card, Emulated};
+use frames::backend::{self, Backend, EmulatedDemo};
 use frames::golden::{self, Findings, Golden, Transfer};
 use protocol::{Command, Content, FrameName};
 use qemu::{Config, Machine};
@@ -23,8 +23,8 @@ fn figures() {
     let ready = ready::with(&options);
     let config = Config::new(&ready);
     let goldens = golden::find(&golden_folder()).expect("golden frames");
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).expect("an emulated card");
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).expect("an emulated card");
     let (mut set_ups, mut kernels, mut frames) = (Vec::new(), Vec::new(), Vec::new());
     let mut verified = Vec::new();
     for _ in 0..BOOTS {
@@ -73,7 +73,7 @@ fn figures() {
         Command::Dump(Content::Page),
         Command::Dump(Content::Memory),
     ] {
-        let lines = machine.ask(command).expect("answers");
+        let lines = machine.send(command).expect("answers");
         // Checksum and LF, and the closing line.
         let line = |line: &String| line.len() + 11;
         let bytes: usize = lines.iter().map(line).sum();
@@ -85,7 +85,7 @@ fn figures() {
     let mut machine = Machine::boot(&config).expect("boots");
     machine.wait_until_running().expect("runs");
     machine.rest(WATCHED).expect("runs on");
-    let counts = machine.ask(Command::Counts).expect("answers");
+    let counts = machine.send(Command::Counts).expect("answers");
     let pace = counts
         .iter()
         .find(|line| line.starts_with("pace "))
@@ -100,16 +100,16 @@ fn figures() {
     println!("writes for a frame:");
     for frame in [0, 240, 480] {
         machine
-            .ask(Command::Show(FrameName::Number(frame)))
+            .send(Command::Show(FrameName::Number(frame)))
             .expect("shows");
         // The first frame of each page paints all of the background; the third round is typical.
         for _ in 0..5 {
             machine
-                .ask(Command::Show(FrameName::Number(frame)))
+                .send(Command::Show(FrameName::Number(frame)))
                 .expect("shows");
         }
         println!("frame {frame}");
-        for line in machine.ask(Command::Counts).expect("answers") {
+        for line in machine.send(Command::Counts).expect("answers") {
             println!("  {line}");
         }
     }
@@ -119,7 +119,7 @@ fn figures() {
 /// Verifies goldens, and returns the time that it needed.
 fn verify(
     goldens: &[Golden],
-    emulated: &mut Emulated<'_>,
+    emulated: &mut EmulatedDemo<'_>,
     machine: &mut Machine,
     transfer: Transfer,
 ) -> Duration {

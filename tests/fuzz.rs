@@ -13,7 +13,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use fastrand::Rng;
-use frames::indexed::Indexed;
+use frames::indexed::IndexedImage;
 use import::{Model, obj, solid, texture};
 use in_place::InPlace;
 use model::{Arena, MAX_BYTES, ModelFile, Parts};
@@ -455,7 +455,7 @@ fn is_read(bytes: &[u8]) -> bool {
         .read_header_info()
         .map(|header| u64::from(header.width) * u64::from(header.height));
     if header.is_ok_and(|pixels| pixels < 1 << 20) {
-        let _ = Indexed::read_png(Cursor::new(bytes));
+        let _ = IndexedImage::read_png(Cursor::new(bytes));
     }
     match texture::read(Cursor::new(bytes)) {
         Ok(frame) => {

@@ -10,7 +10,7 @@
 use std::fs::File;
 use std::path::Path;
 
-use frames::indexed::Indexed;
+use frames::indexed::IndexedImage;
 use modex::{Destination, HEIGHT, Lane, PlanarBuffer, STRIDE, WIDTH};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, Mapper, Order, Renderer, Texture, Vertex};
@@ -219,7 +219,7 @@ fn frame() {
         let row: Vec<u8> = row.iter().flat_map(|&pixel| [pixel; 2]).collect();
         [row.clone(), row].concat()
     });
-    let frame = Indexed {
+    let frame = IndexedImage {
         width: 4 * WIDTH,
         height: 2 * HEIGHT,
         palette,

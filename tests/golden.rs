@@ -10,8 +10,8 @@ use std::process::Command as Process;
 use std::sync::LazyLock;
 
 use crystal_ball::golden_folder;
-use frames::card::{self, Card, Emulated};
-use frames::difference::Subject;
+use frames::backend::{self, Backend, EmulatedDemo};
+use frames::difference::Capture;
 use frames::golden::{self, Findings, Golden, Transfer};
 use protocol::{Command, Content, FrameName};
 use qemu::{Config, Machine};
@@ -42,8 +42,8 @@ fn conclude(findings: Findings, test: &str) {
 
 #[test]
 fn emulated_card_draws_every_golden() {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let mut findings = Findings::default();
     let goldens = goldens();
     for golden in &goldens {
@@ -83,8 +83,8 @@ const BYTE_BY_BYTE: [&str; 11] = [
 
 #[test]
 fn qemu_shows_and_holds_every_golden() {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let mut machine = Machine::boot(&config()).unwrap();
     let mut findings = Findings::default();
     for golden in goldens() {
@@ -103,7 +103,7 @@ fn qemu_shows_and_holds_every_golden() {
 
 /// The kind of scene that a golden shows.
 fn kind_of_scene(golden: &Golden) -> &'static str {
-    match golden.look.scene.map_or("ball", |scene| scene.0) {
+    match golden.options.scene.unwrap_or("ball") {
         "ball" | "cube" => "convex solid",
         "knot" => "solid that hides parts of itself",
         "facing" | "tilted" | "wall" => "single face",
@@ -127,12 +127,12 @@ fn goldens_sent_byte_by_byte_are_of_every_kind() {
             .collect::<Vec<_>>()
     };
     let of_mapper = covered(|a, b| {
-        let [a, b] = [a, b].map(|golden| golden.look.mapper.unwrap_or_default());
+        let [a, b] = [a, b].map(|golden| golden.options.mapper.unwrap_or_default());
         discriminant(&a) == discriminant(&b)
     });
     assert_eq!(of_mapper, [""; 0], "no golden with such a mapper is sent");
     let of_order = covered(|a, b| {
-        let [a, b] = [a, b].map(|golden| golden.look.order.map(|order| order.0));
+        let [a, b] = [a, b].map(|golden| golden.options.order);
         a.unwrap_or_default() == b.unwrap_or_default()
     });
     assert_eq!(of_order, [""; 0], "no golden with such an order is sent");
@@ -144,11 +144,11 @@ fn goldens_sent_byte_by_byte_are_of_every_kind() {
 fn every_mapper_and_every_order_has_a_golden() {
     let all = goldens();
     for &(name, mapper, _) in Mapper::ALL {
-        let has = |golden: &Golden| golden.look.mapper.unwrap_or_default() == mapper;
+        let has = |golden: &Golden| golden.options.mapper.unwrap_or_default() == mapper;
         assert!(all.iter().any(has), "no golden is drawn by {name}");
     }
     for (name, order, _) in Order::ALL {
-        let drawn = |golden: &Golden| golden.look.order.map_or(Order::default(), |set| set.0);
+        let drawn = |golden: &Golden| golden.options.order.unwrap_or_default();
         assert!(
             all.iter().any(|golden| drawn(golden) == order),
             "no golden is drawn in the order {name}"
@@ -196,8 +196,8 @@ pub fn with_arguments(ready: &Ready, vga: &str, arguments: &str) -> Config {
 /// If the boot fails, or goldens differ.
 pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
     let mut machine = Machine::boot(config)?;
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory)?;
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory)?;
     let mut findings = Findings::default();
     for golden in goldens {
         findings.check_cards(golden, &mut emulated, &mut machine, Transfer::Checksums)?;
@@ -211,21 +211,21 @@ pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
 pub fn evidence(config: &Config) -> anyhow::Result<Vec<String>> {
     let mut machine = Machine::boot(config)?;
     machine.show(&[0, 480, u32::MAX].map(FrameName::Number))?;
-    let mut evidence = machine.ask(Command::Checksums(Content::Memory))?;
-    evidence.extend(machine.ask(Command::Counts)?);
+    let mut evidence = machine.send(Command::Checksums(Content::Memory))?;
+    evidence.extend(machine.send(Command::Counts)?);
     machine.leave()?;
     Ok(evidence)
 }
 
 /// The emulated VGA's evidence for the same frames.
 pub fn emulated_evidence() -> Vec<String> {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     emulated
         .show(&[0, 480, u32::MAX].map(FrameName::Number))
         .unwrap();
-    let mut evidence = emulated.ask(Command::Checksums(Content::Memory)).unwrap();
-    evidence.extend(emulated.ask(Command::Counts).unwrap());
+    let mut evidence = emulated.send(Command::Checksums(Content::Memory)).unwrap();
+    evidence.extend(emulated.send(Command::Counts).unwrap());
     evidence
 }
 
@@ -246,8 +246,8 @@ fn two_goldens() -> TempDir {
 
 /// The findings of a folder's check.
 fn found(folder: &Path) -> Vec<String> {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let mut findings = Findings::default();
     for golden in golden::find(folder).unwrap() {
         findings.check_golden(&golden, &mut emulated).unwrap();
@@ -268,27 +268,28 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
     // A broken PNG.
     std::fs::write(at("belt.png"), b"\x89PNG").unwrap();
     let wrong = found(copy.path());
-    assert!(wrong[0].contains("belt.png is no golden"), "{wrong:?}");
+    let unreadable = "belt.png: cannot be read as a golden frame";
+    assert!(wrong[0].contains(unreadable), "{wrong:?}");
     std::fs::remove_file(at("belt.png")).unwrap();
     let wrong = found(copy.path());
-    assert!(wrong[0].contains("never blessed"), "{wrong:?}");
+    assert!(wrong[0].contains("the PNG is missing"), "{wrong:?}");
     // An orphan, an invalid description, an unrelated file, an empty folder.
     let refused = |words: &str| {
         let error = format!("{:#}", golden::find(copy.path()).unwrap_err());
         assert!(error.contains(words), "{error}");
     };
     std::fs::remove_file(at("north.toml")).unwrap();
-    refused("north.png is an orphan");
+    refused("north.png: the description north.toml is missing");
     std::fs::remove_file(at("north.png")).unwrap();
     for (description, words) in [
         ("about = \"a\"", "missing field `show`"),
-        ("about = \"a\"\nshow = []", "it shows nothing"),
-        ("about = \"a\"\nshow = [\"x\"]", "'x' is no frame"),
+        ("about = \"a\"\nshow = []", "`show` is empty"),
+        ("about = \"a\"\nshow = [\"x\"]", "'x' is not a frame's name"),
         (
             "about = \"a\"\nshow = [\"0\"]\nmore = 1",
             "unknown field `more`",
         ),
-        ("belt", "belt.toml is no golden's description"),
+        ("belt", "belt.toml: not a valid description of a golden"),
     ] {
         std::fs::write(at("belt.toml"), description).unwrap();
         refused(words);
@@ -303,11 +304,11 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
 /// The wrong frame is found even if it is as similar as possible to the right one.
 #[test]
 fn the_wrong_frame_is_found() {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let mut dump = |frame| {
         emulated.show(&[FrameName::Number(frame)]).unwrap();
-        Subject::Dump(emulated.dump(Content::Page).unwrap())
+        Capture::Dump(emulated.dump(Content::Page).unwrap())
     };
     let mut findings = Findings::default();
     let golden = &goldens()[0];
@@ -336,8 +337,8 @@ fn a_blessing_tells_what_changes_and_makes_the_goldens() {
     };
     let words = bless();
     for line in [
-        "belt: changes: ",
-        "new: is new: A new one.",
+        "belt: expected the golden, got the new frame: ",
+        "new: new: A new one.",
         "2 golden frames blessed",
     ] {
         assert!(words.contains(line), "{words}");
@@ -350,8 +351,8 @@ fn a_blessing_tells_what_changes_and_makes_the_goldens() {
 /// Finds a stray write anywhere: on a hidden page, after the last page, in another plane.
 #[test]
 fn all_of_video_memory_is_as_the_emulated_card_has_it() {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let mut machine = Machine::boot(&config()).unwrap();
     let frames = [0, 100, 200, 4_000_000_000, 300].map(FrameName::Number);
     emulated.show(&frames).unwrap();
@@ -366,8 +367,8 @@ fn all_of_video_memory_is_as_the_emulated_card_has_it() {
     findings.compare(
         golden,
         "all of video memory",
-        &Subject::Dump(expected),
-        &Subject::Dump(got),
+        &Capture::Dump(expected),
+        &Capture::Dump(got),
     );
     machine.leave().unwrap();
     conclude(findings, "memory");
@@ -473,8 +474,8 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
     let mut config = config();
     config.arguments = vec!["-D".into(), trace.clone().into()];
     let mut machine = Machine::boot(&config).unwrap();
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     // The fourth frame erases what the first left on its page.
     let before = [0, 60, 120].map(FrameName::Number);
     emulated.show(&before).unwrap();
@@ -484,13 +485,13 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
         machine.trace(event, true).unwrap();
     }
     let show = Command::Show(FrameName::Number(180));
-    machine.ask(show).unwrap();
+    machine.send(show).unwrap();
     for event in events {
         machine.trace(event, false).unwrap();
     }
     machine.leave().unwrap();
     emulated.vga().start_log();
-    emulated.ask(show).unwrap();
+    emulated.send(show).unwrap();
     let log = emulated.vga().take_log();
     let logged: Vec<_> = log.iter().flat_map(Write::logged).collect();
     let text = std::fs::read_to_string(&trace).unwrap();
@@ -506,7 +507,7 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
     let map_masks = traced
         .windows(2)
         .filter(|pair| matches!(pair, [Write::Port(0x3C4, 2), Write::Port(0x3C5, _)]));
-    let counts = emulated.ask(Command::Counts).unwrap();
+    let counts = emulated.send(Command::Counts).unwrap();
     let mut columns = counts[0].split(' ').skip_while(|word| *word != "columns");
     let columns: usize = columns.nth(1).unwrap().parse().unwrap();
     assert!(columns > 3000, "{columns} columns");

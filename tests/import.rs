@@ -468,12 +468,12 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
         (
             &["--texture", "thing.png"],
             2,
-            "--texture needs your own model: add --model FILE.obj",
+            "--texture needs a model; add --model FILE.obj",
         ),
         (
             &["--scene", "model"],
             2,
-            "--scene model needs your own model: add --model FILE.obj",
+            "--scene model needs a model; add --model FILE.obj",
         ),
     ] {
         let (ended, words, _) = emulate(path, arguments);
@@ -550,10 +550,10 @@ fn bytes_of_dumps_and_descriptions_are_escaped() {
         (
             &["diff", evil, "a.dump"],
             2,
-            r"\x1b]0;title\x07: it cannot be read",
+            r"\x1b]0;title\x07: cannot be read",
         ),
         (&["bless", "golden"], 1, "line 2: "),
-        (&["bless", "keys"], 1, r"'\x1b[31m' is no frame"),
+        (&["bless", "keys"], 1, r"'\x1b[31m' is not a frame's name"),
         (&["--scene", evil], 2, "for '--scene <NAME>'"),
     ] {
         let (ended, words) = run(path, arguments);

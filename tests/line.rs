@@ -10,7 +10,7 @@ use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread;
 use std::time::Duration;
 
-use frames::card::{self, Card, Emulated};
+use frames::backend::{self, Backend, EmulatedDemo};
 use frames::dump::Dump;
 use protocol::{Command, Content, FrameName};
 use qemu::{Config, Limits, Machine, Verdict};
@@ -173,12 +173,12 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
         (
             "a lost line",
             |n, line| if n == 100 { Vec::new() } else { line.to_vec() },
-            "stands where 'line 100' should",
+            "expected 'line 100', found",
         ),
         (
             "a repeated line",
             |n, line| line.repeat(1 + usize::from(n == 100)),
-            "stands where 'line 101' should",
+            "expected 'line 101', found",
         ),
         (
             "a dump cut short",
@@ -189,12 +189,12 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
                     line.to_vec()
                 }
             },
-            "cut short: 'line 150' should come here",
+            "cut short: expected 'line 150'",
         ),
         (
             "a dump without its end",
             |n, line| if n == 240 { Vec::new() } else { line.to_vec() },
-            "cut short: 'end' should come here",
+            "cut short: expected 'end'",
         ),
     ];
     for (fault, step, words) in faults {
@@ -231,15 +231,15 @@ fn swapped_lines_are_told_by_their_numbers() {
         _ => line.to_vec(),
     }));
     let words = judged.0.to_string();
-    assert!(words.contains("stands where 'line 100' should"), "{words}");
+    assert!(words.contains("expected 'line 100', found"), "{words}");
 }
 
 /// The changes that a terminal makes to line ends have no effect.
 #[test]
 fn line_ends_of_a_terminal_are_accepted() {
     let returned = |_, line: &[u8]| [&line[..line.len() - 1], b"\r\n"].concat();
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     emulated.show(&[FrameName::Number(480)]).unwrap();
     let expected = emulated.dump(Content::Page).unwrap();
     assert_eq!(dump_altered(returned).unwrap(), expected);
@@ -332,7 +332,7 @@ fn a_host_that_stops_reading_is_waited_for() {
 #[test]
 fn noise_on_the_line_is_answered_and_survived() {
     let mut machine = Machine::boot(&config()).unwrap();
-    machine.ask(Command::Hold).unwrap();
+    machine.send(Command::Hold).unwrap();
     for (noise, reason) in [
         (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
         (vec![b'x'; 200_000], "longer than 700 bytes"),
@@ -368,7 +368,7 @@ fn noise_on_the_line_is_answered_and_survived() {
 fn a_flood_of_noise_changes_no_byte() {
     let mut machine = Machine::boot(&config()).unwrap();
     machine.show(&[FrameName::Number(7)]).unwrap();
-    let before = machine.ask(Command::Checksums(Content::Memory)).unwrap();
+    let before = machine.send(Command::Checksums(Content::Memory)).unwrap();
     let mut state = seeded::generator().get_seed() << 1 | 1;
     let mut random = move || {
         // Knuth's MMIX generator; only its high bits are good.
@@ -395,7 +395,7 @@ fn a_flood_of_noise_changes_no_byte() {
     }
     assert_eq!(errors, ends + 1);
     assert_eq!(
-        machine.ask(Command::Checksums(Content::Memory)).unwrap(),
+        machine.send(Command::Checksums(Content::Memory)).unwrap(),
         before
     );
     machine.leave().unwrap();

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::sync::LazyLock;
 
 use bench::Work;
-use study::measure::{self, Config, Cpu, Emulated, Measured, Memories};
+use study::measure::{self, BenchMemories, Cpu, EmulatedBenches, KernelFigures, MeasureConfig};
 use texmap::{Mapper, Order};
 
 use crate::ready::READY;
@@ -18,18 +18,18 @@ fn mappers(names: &[&str]) -> Vec<Mapper> {
 /// Measures a mapper of each kind. The run itself checks that figures repeat under `-icount`, that the number
 /// of pixels is equal without it, and that QEMU and the emulated VGA draw the same frames.
 #[test]
-fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
+fn the_benchmark_kernel_boots_and_its_figures_are_plausible() {
     LazyLock::force(&READY);
     let names = ["row-passes", "affine", "exact"];
-    let measured = measure::run(&Config {
+    let measured = measure::run(&MeasureConfig {
         cpus: vec![Cpu::Baseline],
         mappers: mappers(&names),
         rounds: 1,
-        ..Config::default()
+        ..MeasureConfig::default()
     })
     .unwrap();
     let [cpu] = &measured.cpus[..] else {
-        panic!("one CPU model was asked for");
+        panic!("expected the figures of one CPU model");
     };
     assert_eq!(cpu.rows.len(), names.len() * Order::ALL.len());
     assert!(!cpu.bmi2, "{} has no BMI2", cpu.cpu);
@@ -66,32 +66,35 @@ fn the_measuring_kernel_boots_and_its_figures_are_plausible() {
         for pair in parts.windows(2) {
             assert!(a_pixel(pair[0]) < a_pixel(pair[1]), "{name}: {pair:?}");
         }
-        // The same drawing costs the same on either side of the card's window, apart from Map Mask.
+        // The same drawing costs the same in RAM and in video memory, apart from Map Mask.
         assert!(
             a_pixel(Work::ScreenRam) <= a_pixel(Work::ScreenCard),
             "{name}"
         );
-        assert_eq!(row.runs.len(), bench::LENGTHS.len());
-        for run in &row.runs {
-            let length = run.length;
-            assert_eq!(run.draw.pixels % u64::from(length), 0, "{name}: {length}");
-            assert_eq!(run.draw.pixels, run.jobs.pixels, "{name}: {length}");
+        assert_eq!(row.spans.len(), bench::LENGTHS.len());
+        for span in &row.spans {
+            let length = span.length;
+            assert_eq!(span.draw.pixels % u64::from(length), 0, "{name}: {length}");
+            assert_eq!(span.draw.pixels, span.jobs.pixels, "{name}: {length}");
         }
-        let (shortest, longest) = (&row.runs[0].draw, &row.runs[bench::LENGTHS.len() - 1].draw);
+        let (shortest, longest) = (
+            &row.spans[0].draw,
+            &row.spans[bench::LENGTHS.len() - 1].draw,
+        );
         assert!(
             shortest.instructions_a_pixel() > longest.instructions_a_pixel(),
-            "{name}: a run of one pixel pays all of its set-up"
+            "{name}: a span of one pixel pays for a whole set-up"
         );
         assert_eq!(row.cost(Work::FrameCard).ticks.len(), 1);
         assert_eq!(row.accesses.loads, 0, "{name} reads video memory");
     }
 }
 
-/// The counters must not change what is drawn, and each order has its characteristic counts.
+/// Also checks that each order has its characteristic counts.
 #[test]
-fn counting_changes_no_byte() {
-    let mut memories = Memories::default();
-    let mut emulated = Emulated::new(&mut memories);
+fn counters_do_not_change_what_is_drawn() {
+    let mut memories = BenchMemories::default();
+    let mut emulated = EmulatedBenches::new(&mut memories);
     for &(_, mapper, _) in Mapper::ALL {
         let mut pixels = Vec::new();
         for (name, order, _) in Order::ALL {
@@ -129,12 +132,12 @@ fn counting_changes_no_byte() {
 #[ignore = "measures for minutes; run it alone"]
 fn figures() {
     LazyLock::force(&READY);
-    let measured = measure::run(&Config::default()).unwrap();
+    let measured = measure::run(&MeasureConfig::default()).unwrap();
     println!("{}", table(&measured));
 }
 
 /// Instructions a pixel and ratios of times, a line for each mapper and order.
-fn table(measured: &Measured) -> String {
+fn table(measured: &KernelFigures) -> String {
     let mut table = format!("QEMU {}\n", measured.qemu);
     for cpu in &measured.cpus {
         let bmi2 = if cpu.bmi2 { "with" } else { "without" };
@@ -142,7 +145,7 @@ fn table(measured: &Measured) -> String {
         let a_pixel = |work| reference.cost(work).instructions_a_pixel();
         writeln!(
             table,
-            "\n-cpu {}, {bmi2} BMI2; bare stores {:.2} instructions a pixel in RAM, {:.2} on the card; \
+            "\n-cpu {}, {bmi2} BMI2; bare stores {:.2} instructions a pixel in RAM, {:.2} in video memory; \
              presenting {:.2}\n{:28} {:>7} {:>7} {:>7} {:>7} {:>7}  {:>6} {:>7} {:>6}  frame over bare stores / over presenting",
             cpu.cpu,
             a_pixel(Work::BareRam),

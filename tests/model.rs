@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use frames::card::{self, Card, Emulated};
-use frames::screen::Screen;
+use frames::backend::{self, Backend, EmulatedDemo};
+use frames::rgb::RgbImage;
 use import::Model;
 use protocol::{Command, Content, FrameName, Setting, Word};
 use qemu::{Config, Machine};
@@ -29,7 +29,7 @@ f 5/1 6/2 -1/3\nf 6/1 7/2 -1/3\nf 7 8 -1\nf 8 1 -1
 fn files() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("thing.obj"), OBJ).unwrap();
-    let screen = Screen {
+    let screen = RgbImage {
         width: 40,
         height: 30,
         pixels: (0..40 * 30)
@@ -67,8 +67,8 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
     let model = model();
     let model_file = model.file();
     let mut machine = boot(model.bytes.clone(), Some(model_file.checksum()));
-    let mut memory = card::memory();
-    let mut emulated = Emulated::with(&mut memory, Some(&model_file)).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::with(&mut memory, Some(&model_file)).unwrap();
     let frames = [
         FrameName::Number(0),
         FrameName::Number(250),
@@ -109,9 +109,9 @@ trait Asked {
     }
 }
 
-impl<C: Card> Asked for C {
+impl<C: Backend> Asked for C {
     fn asked(&mut self, command: Command) -> Vec<String> {
-        self.ask(command).unwrap()
+        self.send(command).unwrap()
     }
 
     fn dumped(&mut self) -> frames::dump::Dump {
@@ -131,8 +131,8 @@ fn a_damaged_ramdisk_is_told_and_the_built_in_scenes_are_there() {
         said.starts_with("refused model: the header states checksum "),
         "{said}"
     );
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory).unwrap();
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let ball = emulated.dump_of(FrameName::Number(480));
     assert_eq!(ball.header.scene, "ball");
     assert_eq!(machine.dump_of(FrameName::Number(480)), ball);

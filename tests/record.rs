@@ -5,8 +5,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::LazyLock;
 
-use frames::difference::Subject;
-use frames::indexed::Indexed;
+use frames::difference::Capture;
+use frames::indexed::IndexedImage;
 use vga::widen;
 
 use crate::ready::READY;
@@ -29,23 +29,23 @@ fn crystal_ball(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Stri
 }
 
 /// The only image of a PNG.
-fn frame(path: &Path) -> Indexed {
-    match Subject::read(path).unwrap() {
-        Subject::Png(frame) => frame,
-        Subject::Dump(_) => panic!("{} is not a PNG", path.display()),
+fn frame(path: &Path) -> IndexedImage {
+    match Capture::read(path).unwrap() {
+        Capture::Png(frame) => frame,
+        Capture::Dump(_) => panic!("{} is not a PNG", path.display()),
     }
 }
 
 #[test]
-fn a_recording_has_the_emulated_cards_frames_and_the_same_bytes_each_time() {
+fn a_recording_has_the_emulated_vgas_frames_and_the_same_bytes_each_time() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let record = |out: &str| {
         let line = format!("record --scene knot --frames 90..=95 --every 5 --out {out}");
         let arguments: Vec<_> = line.split(' ').collect();
-        let (code, told, errors) = crystal_ball(folder.path(), &arguments);
+        let (code, output, errors) = crystal_ball(folder.path(), &arguments);
         assert_eq!(code, Some(0), "{errors}");
-        told
+        output
     };
     assert_eq!(record("a.gif"), "a.gif\n");
     record("b.gif");
@@ -90,9 +90,13 @@ fn a_recording_has_the_emulated_cards_frames_and_the_same_bytes_each_time() {
     }
 
     // Six dumps with their PNGs give six images, each with its name below it.
-    let (code, told, errors) =
+    let (code, output, errors) =
         crystal_ball(folder.path(), &["replay", "own", "--sheet", "sheet.png"]);
-    assert_eq!((code, told.as_str()), (Some(0), "sheet.png\n"), "{errors}");
+    assert_eq!(
+        (code, output.as_str()),
+        (Some(0), "sheet.png\n"),
+        "{errors}"
+    );
     let sheet = png::Decoder::new(std::io::BufReader::new(
         fs::File::open(at("sheet.png")).unwrap(),
     ));
@@ -101,25 +105,21 @@ fn a_recording_has_the_emulated_cards_frames_and_the_same_bytes_each_time() {
 }
 
 #[test]
-fn what_cannot_be_recorded_or_replayed_is_told_and_leaves_nothing() {
+fn an_impossible_recording_or_replay_is_an_error_and_leaves_no_file() {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("a.dump"), "not one").unwrap();
     fs::create_dir(folder.path().join("empty")).unwrap();
     for (line, code, why) in [
-        (
-            "record --out a.mp4",
-            2,
-            "a.mp4: a recording is a GIF or a folder of PNGs, and no .mp4",
-        ),
+        ("record --out a.mp4", 2, "--out a.mp4: cannot record a .mp4"),
         (
             "record --every 1 --out a.gif",
             2,
-            "--every 1: a GIF shows each frame for",
+            "--every 1: too fast for a GIF",
         ),
         (
             "record --frames 5..5 --out a.gif",
             2,
-            "there is no frame in it",
+            "the range has no frame",
         ),
         (
             "record --frames 0..3 --out no/where/a.gif",
@@ -129,19 +129,19 @@ fn what_cannot_be_recorded_or_replayed_is_told_and_leaves_nothing() {
         (
             "replay empty --sheet s.png",
             1,
-            "there is no dump and no PNG in what was named",
+            "no .dump or .png file to show",
         ),
-        ("replay gone --sheet s.png", 1, "gone: it cannot be read"),
+        ("replay gone --sheet s.png", 1, "gone: cannot be read"),
         ("replay a.dump --sheet s.png", 1, "a.dump: line 1: "),
-        (
-            "replay a.dump",
-            1,
-            "standard output is no terminal to play in",
-        ),
+        ("replay a.dump", 1, "standard output is not a terminal"),
     ] {
         let arguments: Vec<_> = line.split(' ').collect();
-        let (found, told, errors) = crystal_ball(folder.path(), &arguments);
-        assert_eq!((found, told.as_str()), (Some(code), ""), "{line}: {errors}");
+        let (found, output, errors) = crystal_ball(folder.path(), &arguments);
+        assert_eq!(
+            (found, output.as_str()),
+            (Some(code), ""),
+            "{line}: {errors}"
+        );
         assert!(errors.contains(why), "{line}: {errors}");
     }
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);

@@ -1,4 +1,4 @@
-//! `trade` from the outside: what it refuses, its messages, and the files that it leaves.
+//! `trade` from the outside: wrong usage, messages, and the files that it writes.
 
 use std::process::{Command, Output, Stdio};
 
@@ -17,20 +17,23 @@ fn trade(arguments: &[&str]) -> Output {
 fn a_debug_build_refuses_and_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let said = trade(&["--out", out.to_str().unwrap()]);
-    assert_eq!(said.status.code(), Some(2));
-    let words = String::from_utf8(said.stderr).unwrap();
-    assert!(words.contains("`cargo run --release -- trade`"), "{words}");
-    assert!(said.stdout.is_empty() && !out.exists());
+    let output = trade(&["--out", out.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(2));
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        errors.contains("`cargo run --release -- trade`"),
+        "{errors}"
+    );
+    assert!(output.stdout.is_empty() && !out.exists());
 }
 
 /// With `cargo test --release`: one scene, two mappers, and only complete files.
 #[cfg(not(debug_assertions))]
 #[test]
-fn a_release_build_measures_what_it_is_asked_for() {
+fn a_release_build_measures_the_requested_scenes_and_mappers() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let said = trade(&[
+    let output = trade(&[
         "--quick",
         "--scene",
         "wall",
@@ -39,8 +42,8 @@ fn a_release_build_measures_what_it_is_asked_for() {
         "--out",
         out.to_str().unwrap(),
     ]);
-    assert_eq!(said.status.code(), Some(0));
-    let path = String::from_utf8(said.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(0));
+    let path = String::from_utf8(output.stdout).unwrap();
     assert_eq!(path.trim(), out.join("trade.html").to_str().unwrap());
     let csv = std::fs::read_to_string(out.join("trade.csv")).unwrap();
     assert_eq!(csv.lines().count(), 1 + 2 * 2);
@@ -51,11 +54,11 @@ fn a_release_build_measures_what_it_is_asked_for() {
 }
 
 #[test]
-fn an_unknown_scene_or_mapper_is_wrong_usage_and_the_known_are_listed() {
+fn an_unknown_scene_or_mapper_is_wrong_usage_and_the_error_lists_the_known_names() {
     for (option, known) in [("--scenes", "grazing-4096"), ("--mappers", "two-carries")] {
-        let said = trade(&[option, "no-such"]);
-        assert_eq!(said.status.code(), Some(2), "{option}");
-        let words = String::from_utf8(said.stderr).unwrap();
-        assert!(words.contains(known), "{words}");
+        let output = trade(&[option, "no-such"]);
+        assert_eq!(output.status.code(), Some(2), "{option}");
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(errors.contains(known), "{errors}");
     }
 }

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 
 use setup::Options;
 
-use crate::arguments::{Boot, Cli, Subcommands, Tools};
+use crate::arguments::{BootOptions, Cli, Subcommands, ToolOptions};
 use crate::common::Common;
 
 /// Runs the subcommand of a command line, and returns its exit code.
@@ -27,16 +27,16 @@ use crate::common::Common;
 pub fn run(cli: Cli) -> anyhow::Result<ExitCode> {
     let Cli {
         command,
-        boot: Boot { headless, vga },
-        look,
+        boot: BootOptions { headless, vga },
+        frame_options,
         model,
-        tools: Tools { qemu, toolchain },
+        tools: ToolOptions { qemu, toolchain },
         qemu_arguments,
     } = cli;
     let common = Common {
         headless,
         vga,
-        look,
+        frame_options,
         files: model,
         options: Options {
             toolchain,

@@ -1,8 +1,8 @@
-//! What the subcommands share: the options that are global, the model, and the machine.
+//! The global options, and the model and the machine that subcommands share.
 
 use std::ffi::OsString;
 
-use frames::look::Look;
+use frames::options::FrameOptions;
 use import::{Files, Model};
 use qemu::{Config, Machine};
 use setup::{Options, Ready};
@@ -15,7 +15,7 @@ pub struct Common {
     /// QEMU's `-vga`.
     pub vga: String,
     /// Scene, mapper and order.
-    pub look: Look,
+    pub frame_options: FrameOptions,
     /// The files of the user's model.
     pub files: Files,
     /// Options of the set-up.
@@ -25,7 +25,7 @@ pub struct Common {
 }
 
 impl Common {
-    /// Imports the user's model, if there is one, and describes it.
+    /// Imports the user's model, if the user named one, and prints a line about it.
     ///
     /// # Errors
     /// As [`Files::load`].
@@ -45,7 +45,7 @@ impl Common {
         let model = self.load()?;
         if let Some(model) = &model {
             say(format_args!(
-                "with its {} KiB the boot takes about {:.2} s longer",
+                "its {} KiB make the boot about {:.2} s longer",
                 model.bytes.len().div_ceil(1024),
                 model.boot_seconds()
             ));
@@ -54,7 +54,7 @@ impl Common {
         Ok(model)
     }
 
-    /// Returns the configuration of a machine that boots the image, with a model in its ramdisk or without.
+    /// Returns the configuration of a machine that boots the image, with a model in the ramdisk if given.
     pub fn config(&mut self, ready: &Ready, model: Option<&Model>) -> Config {
         Config {
             vga: std::mem::take(&mut self.vga),

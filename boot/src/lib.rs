@@ -1,4 +1,4 @@
-//! What the `crystal-ball` command and its tests share.
+//! The parts of the `crystal-ball` command that its tests use too.
 
 pub mod window;
 

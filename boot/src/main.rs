@@ -10,7 +10,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, FromArgMatches};
-use frames::look::Named;
+
 use qemu::{Failure, Printed, Verdict};
 use scene::catalogue::Entry;
 use system::{Interrupted, say};
@@ -26,26 +26,26 @@ fn main() -> ExitCode {
         if !std::env::args_os().any(has_control) {
             error.exit();
         }
-        // The message may quote a word that a terminal obeys: print it without clap's colours.
+        // The message may quote an escape sequence: print it escaped, without clap's colours.
         say(&error);
         std::process::exit(error.exit_code());
     });
     // clap cannot require this of options that stand on different sides of a subcommand.
-    let needs_model = match (&cli.model.texture, cli.look.scene) {
+    let needs_model = match (&cli.model.texture, cli.frame_options.scene) {
         (Some(_), _) => Some("--texture"),
-        (_, Some(Named(Entry::LOADED))) => Some("--scene model"),
+        (_, Some(Entry::LOADED)) => Some("--scene model"),
         _ => None,
     };
     if let Some(option) = needs_model.filter(|_| cli.model.model.is_none()) {
         let kind = clap::error::ErrorKind::MissingRequiredArgument;
-        let message = format!("{option} needs your own model: add --model FILE.obj");
+        let message = format!("{option} needs a model; add --model FILE.obj");
         Cli::command().error(kind, message).exit();
     }
     system::catch_interrupts();
     match commands::run(cli) {
         Ok(code) => code,
         Err(error) if error.is::<Printed>() => {
-            // If standard output is closed, nobody reads it.
+            // If standard output is closed, nobody reads the list.
             let _ = writeln!(Output, "{error}");
             ExitCode::SUCCESS
         }

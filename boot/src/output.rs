@@ -5,7 +5,7 @@ use std::path::Path;
 
 use system::quote::printable;
 
-/// Standard output. A closed reader is no error; a full disk is.
+/// Standard output. A full disk is an error; a closed pipe is not.
 pub struct Output;
 
 impl Output {
@@ -15,7 +15,7 @@ impl Output {
             // The caller tries again.
             io::ErrorKind::Interrupted => Err(error),
             kind => {
-                let message = format!("standard output cannot be written: {error}");
+                let message = format!("cannot write to standard output: {error}");
                 Err(io::Error::new(kind, message))
             }
         })
@@ -23,8 +23,8 @@ impl Output {
 }
 
 impl Write for Output {
-    /// Writes bytes unchanged into a pipe or file. On a terminal, escape sequences (in a file's name, for example)
-    /// are shown and not obeyed.
+    /// Writes bytes unchanged into a pipe or file. On a terminal, escape sequences (in a file's name, for
+    /// example) are shown and not obeyed.
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let mut out = io::stdout().lock();
         match std::str::from_utf8(bytes) {

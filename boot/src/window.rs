@@ -13,7 +13,7 @@ use x11rb::rust_connection::RustConnection;
 
 /// A rectangle of the screen, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Area {
+struct Rectangle {
     x: i32,
     y: i32,
     width: u32,
@@ -23,13 +23,13 @@ struct Area {
 /// The largest part of a monitor's width and height that the frame gets, in fifths: title bars and panels
 /// need the rest.
 const FIFTHS: u32 = 4;
-/// The size of Mode X's frame. A whole multiple of it shows all pixels equally large.
-const PICTURE: (u32, u32) = (320, 240);
+/// The size of Mode X's frame. At a whole multiple of this size all pixels are equally large.
+const FRAME: (u32, u32) = (320, 240);
 
 /// Enlarges the window of QEMU's process, if the window exists and has the size that QEMU gave it.
 ///
 /// # Errors
-/// If there is no X server, or it refuses a request. The window keeps its size.
+/// If no X server is found, or the server refuses a request. The window keeps its size.
 pub fn enlarge(process: u32) -> anyhow::Result<()> {
     let (x, screen) = x11rb::connect(None)?;
     let root = x.setup().roots[screen].root;
@@ -38,14 +38,14 @@ pub fn enlarge(process: u32) -> anyhow::Result<()> {
     };
     let geometry = x.get_geometry(window)?.reply()?;
     let place = x.translate_coordinates(window, root, 0, 0)?.reply()?;
-    let now = Area {
+    let now = Rectangle {
         x: place.dst_x.into(),
         y: place.dst_y.into(),
         width: geometry.width.into(),
         height: geometry.height.into(),
     };
     let monitors = x.randr_get_monitors(root, true)?.reply()?.monitors;
-    let monitors = monitors.iter().map(|monitor| Area {
+    let monitors = monitors.iter().map(|monitor| Rectangle {
         x: monitor.x.into(),
         y: monitor.y.into(),
         width: monitor.width.into(),
@@ -66,7 +66,7 @@ pub fn enlarge(process: u32) -> anyhow::Result<()> {
     Ok(())
 }
 
-impl Area {
+impl Rectangle {
     fn middle(self) -> (i32, i32) {
         let half = |length: u32| (length / 2).cast_signed();
         (self.x + half(self.width), self.y + half(self.height))
@@ -106,10 +106,11 @@ fn find(x: &RustConnection, root: Window, process: u32) -> anyhow::Result<Option
         .find(|&window| is_shown(window).unwrap_or(false)))
 }
 
-/// Returns the largest suitable rectangle in the monitor's middle. Returns `None` if the window is already
-/// as large as that, or does not have a size that QEMU gives it, because then somebody else chose the size.
-fn enlarged(window: Area, monitor: Area) -> Option<Area> {
-    let (width, height) = PICTURE;
+/// Returns the largest suitable rectangle in the monitor's middle. Returns `None` if the window is already as
+/// large as the rectangle, or has a size that QEMU does not give it: then the user or the window manager
+/// chose the size.
+fn enlarged(window: Rectangle, monitor: Rectangle) -> Option<Rectangle> {
+    let (width, height) = FRAME;
     // The height above the frame: GTK's menus.
     let above = window.height.checked_sub(window.width / width * height)?;
     if !window.width.is_multiple_of(width) || above > window.height / 8 {
@@ -119,7 +120,7 @@ fn enlarged(window: Area, monitor: Area) -> Option<Area> {
     let times = fits(monitor.width, width).min(fits(monitor.height, height));
     let (width, height) = (times * width, times * height + above);
     let (x, y) = monitor.middle();
-    (width > window.width).then(|| Area {
+    (width > window.width).then(|| Rectangle {
         x: x - (width / 2).cast_signed(),
         y: y - (height / 2).cast_signed(),
         width,
@@ -131,8 +132,8 @@ fn enlarged(window: Area, monitor: Area) -> Option<Area> {
 mod tests {
     use super::*;
 
-    fn area(x: i32, y: i32, width: u32, height: u32) -> Area {
-        Area {
+    fn area(x: i32, y: i32, width: u32, height: u32) -> Rectangle {
+        Rectangle {
             x,
             y,
             width,
@@ -141,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn window_takes_the_largest_whole_multiple_that_leaves_room() {
+    fn a_window_is_enlarged_to_the_largest_whole_multiple_that_leaves_room() {
         let gtk = area(10, 10, 640, 505);
         for (monitor, large) in [
             (area(0, 0, 1920, 1080), Some(area(480, 168, 960, 745))),
@@ -176,7 +177,7 @@ mod tests {
     }
 
     #[test]
-    fn place_is_on_one_monitor_only() {
+    fn a_point_is_on_at_most_one_monitor() {
         let (left, right) = (area(0, 0, 1920, 1080), area(1920, 0, 1280, 1024));
         for (x, y, of) in [
             (0, 0, [true, false]),

@@ -11,11 +11,11 @@ use std::path::Path;
 
 use system::{Interrupted, interrupted, quote, say};
 
-use crate::difference::{Subject, compare};
+use crate::difference::{Capture, compare};
 use crate::report::Report;
 
-/// Extensions of the files to compare in a folder.
-const ENDINGS: [&str; 2] = ["dump", "png"];
+/// The extensions of the files to compare in a folder.
+const EXTENSIONS: [&str; 2] = ["dump", "png"];
 
 /// The result of a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -50,7 +50,7 @@ pub fn run(
     report: Option<&Path>,
     out: &mut impl Write,
 ) -> anyhow::Result<Outcome> {
-    let mut findings = Findings {
+    let mut comparison = Comparison {
         report: report.map(|_| Report::between(a, b)),
         out,
         pairs: 0,
@@ -59,31 +59,31 @@ pub fn run(
         pixels: 0,
     };
     match (a.is_dir(), b.is_dir()) {
-        (true, true) => findings.folders(a, b)?,
-        (false, false) => findings.files(a, b)?,
+        (true, true) => comparison.folders(a, b)?,
+        (false, false) => comparison.files(a, b)?,
         (a_is_folder, _) => {
             let (folder, other) = if a_is_folder { (a, b) } else { (b, a) };
             let why = match other.metadata() {
                 Ok(_) => format!(
-                    "{} is a folder and {} is none; give two files or two folders",
+                    "{} is a folder, {} is a file; give two files or two folders",
                     quote::path(folder),
                     quote::path(other)
                 ),
-                Err(error) => format!("{}: it cannot be read: {error}", quote::path(other)),
+                Err(error) => format!("{}: cannot be read: {error}", quote::path(other)),
             };
-            findings.incomparable(&quote::path(other), &why);
+            comparison.incomparable(&quote::path(other), &why);
         }
     }
-    let outcome = findings.outcome();
-    if let (Some(html), Some(report)) = (report, findings.report) {
+    let outcome = comparison.outcome();
+    if let (Some(html), Some(report)) = (report, comparison.report) {
         report.write(html)?;
-        say(format_args!("the report: {}", html.display()));
+        say(format_args!("report: {}", html.display()));
     }
     Ok(outcome)
 }
 
-/// The results so far.
-struct Findings<'a, W> {
+/// A comparison, with the results so far.
+struct Comparison<'a, W> {
     /// The report, if the user requested one.
     report: Option<Report>,
     out: &'a mut W,
@@ -93,7 +93,7 @@ struct Findings<'a, W> {
     pixels: usize,
 }
 
-impl<W: Write> Findings<'_, W> {
+impl<W: Write> Comparison<'_, W> {
     fn files(&mut self, a: &Path, b: &Path) -> anyhow::Result<()> {
         let (from, to) = (quote::path(a), quote::path(b));
         let name = match (a.file_name(), b.file_name()) {
@@ -122,7 +122,7 @@ impl<W: Write> Findings<'_, W> {
                 Ok(list) => *names = list,
                 Err(error) => {
                     let folder = quote::path(folder);
-                    let why = format!("{folder}: it cannot be read: {error}");
+                    let why = format!("{folder}: cannot be read: {error}");
                     self.incomparable(&folder, &why);
                     return Ok(());
                 }
@@ -142,7 +142,10 @@ impl<W: Write> Findings<'_, W> {
             if let Some((has, lacks)) = lacks {
                 let (has, lacks) = (quote::path(has), quote::path(lacks));
                 self.pairs += 1;
-                self.incomparable(&shown, &format!("{shown} is in {has}, {lacks} lacks it"));
+                self.incomparable(
+                    &shown,
+                    &format!("{shown}: in {has}, but missing from {lacks}"),
+                );
                 continue;
             }
             let differs = format!("{shown} differs");
@@ -151,7 +154,7 @@ impl<W: Write> Findings<'_, W> {
         let pairs = self.pairs;
         if pairs == 0 {
             let (a, b) = (quote::path(a), quote::path(b));
-            let why = format!("there is nothing to compare: no .dump and no .png in {a} and {b}");
+            let why = format!("{a} and {b}: neither folder has a .dump or a .png file to compare");
             self.incomparable(&a, &why);
             return Ok(());
         }
@@ -181,7 +184,7 @@ impl<W: Write> Findings<'_, W> {
         b: &Path,
     ) -> anyhow::Result<()> {
         self.pairs += 1;
-        let (expected, got) = match (Subject::read(a), Subject::read(b)) {
+        let (expected, got) = match (Capture::read(a), Capture::read(b)) {
             (Ok(expected), Ok(got)) => (expected, got),
             (expected, got) => {
                 let errors = [expected.err(), got.err()];
@@ -196,8 +199,8 @@ impl<W: Write> Findings<'_, W> {
         match compare(&expected, &got) {
             Ok(None) => {
                 self.pixels += match (&expected, &got) {
-                    (Subject::Png(frame), _) | (_, Subject::Png(frame)) => frame.pixels.len(),
-                    (Subject::Dump(dump), _) => dump.pixels.len(),
+                    (Capture::Png(frame), _) | (_, Capture::Png(frame)) => frame.pixels.len(),
+                    (Capture::Dump(dump), _) => dump.pixels.len(),
                 };
                 if let Some(report) = &mut self.report {
                     report.add_equal();
@@ -210,7 +213,7 @@ impl<W: Write> Findings<'_, W> {
                     report.add(name, &expected, &got, &difference);
                 }
             }
-            Err(why) => self.incomparable(name, &format!("{both} can't be compared: {why:#}")),
+            Err(why) => self.incomparable(name, &format!("{both} cannot be compared: {why:#}")),
         }
         Ok(())
     }
@@ -241,8 +244,8 @@ pub(crate) fn list(folder: &Path) -> std::io::Result<BTreeSet<OsString>> {
     let mut names = BTreeSet::new();
     for entry in fs::read_dir(folder)? {
         let name = entry?.file_name();
-        let ending = Path::new(&name).extension();
-        if ending.is_some_and(|ending| ENDINGS.iter().any(|known| ending == *known)) {
+        let extension = Path::new(&name).extension();
+        if extension.is_some_and(|found| EXTENSIONS.iter().any(|known| found == *known)) {
             names.insert(name);
         }
     }

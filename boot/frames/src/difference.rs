@@ -16,7 +16,7 @@ use protocol::Content;
 use protocol::dump::{MAGIC, OrNone, PLANE_BYTES};
 
 use crate::dump::Dump;
-use crate::indexed::Indexed;
+use crate::indexed::IndexedImage;
 use system::quote;
 
 /// The first bytes of every PNG.
@@ -26,25 +26,26 @@ const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const MAX_BYTES: u64 = 1 << 26;
 /// Most pixels of a PNG: a PNG's header may claim more pixels than fit into memory.
 const MAX_PIXELS: u64 = 1 << 24;
-/// One side of a comparison.
+
+/// A captured frame: one side of a comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[expect(
     clippy::large_enum_variant,
-    reason = "either has its pixels on the heap"
+    reason = "both variants have their pixels on the heap"
 )]
-pub enum Subject {
+pub enum Capture {
     /// The contents of a VGA.
     Dump(Dump),
     /// A frame from an indexed PNG.
-    Png(Indexed),
+    Png(IndexedImage),
 }
 
-impl Subject {
+impl Capture {
     /// Reads a PNG or a dump. The content decides which, not the name.
     ///
     /// # Errors
-    /// A file that cannot be read, or is neither; the error has the file's name, and for a damaged dump the
-    /// line.
+    /// A file that cannot be read, or is neither a PNG nor a dump. The error has the file's name, and for a
+    /// damaged dump the line.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         Self::load(path).with_context(|| quote::path(path))
     }
@@ -53,9 +54,9 @@ impl Subject {
         let mut bytes = Vec::new();
         File::open(path)
             .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
-            .context("it cannot be read")?;
+            .context("cannot be read")?;
         if bytes.len() as u64 > MAX_BYTES {
-            bail!("it has more than {MAX_BYTES} bytes: it is neither dump nor frame");
+            bail!("the file has more than {MAX_BYTES} bytes; a dump or a frame's PNG has fewer");
         }
         if bytes.starts_with(PNG) {
             return Ok(Self::Png(read_png(&bytes)?));
@@ -65,13 +66,13 @@ impl Subject {
             anyhow::anyhow!(if bytes.starts_with(MAGIC.as_bytes()) {
                 format!("{error}; take the dump again")
             } else {
-                format!("{error}, nor is it a PNG; `diff` compares dumps and indexed PNGs")
+                format!("{error}, and not a PNG; give a dump or an indexed PNG")
             })
         })?))
     }
 
     /// Returns the frame on the screen.
-    pub(crate) fn frame(&self) -> Cow<'_, Indexed> {
+    pub(crate) fn frame(&self) -> Cow<'_, IndexedImage> {
         match self {
             Self::Dump(dump) => Cow::Owned(dump.frame()),
             Self::Png(frame) => Cow::Borrowed(frame),
@@ -79,42 +80,40 @@ impl Subject {
     }
 }
 
-fn read_png(bytes: &[u8]) -> anyhow::Result<Indexed> {
+fn read_png(bytes: &[u8]) -> anyhow::Result<IndexedImage> {
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
-    let cut = "it is no whole PNG";
-    let header = decoder.read_header_info().context(cut)?;
+    let damaged = "the PNG is damaged or cut short";
+    let header = decoder.read_header_info().context(damaged)?;
     let (width, height) = (header.width, header.height);
     if u64::from(width) * u64::from(height) > MAX_PIXELS {
-        bail!("its header claims {width} x {height} pixels; `diff` takes up to {MAX_PIXELS}");
+        bail!("the PNG's header claims {width} x {height} pixels; the limit is {MAX_PIXELS}");
     }
-    Indexed::read_png(Cursor::new(bytes)).map_err(|error| {
+    IndexedImage::read_png(Cursor::new(bytes)).map_err(|error| {
         if error.is::<png::DecodingError>() {
-            error.context(cut)
+            error.context(damaged)
         } else {
-            anyhow::anyhow!(
-                "{error:#}; `diff` compares indices, as this program's own PNGs keep them"
-            )
+            error
         }
     })
 }
 
-/// The difference between two subjects; [`Display`](fmt::Display) describes it in one line.
+/// The difference between two captures; [`Display`](fmt::Display) describes it in one line.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Difference {
     /// The pixels that differ; for dumps of all memory, the bytes.
-    pub pixels: Option<Pixels>,
+    pub pixels: Option<PixelDifference>,
     /// The palette entries that differ.
-    pub palette: Option<Colours>,
+    pub palette: Option<PaletteDifference>,
     /// The fields of the dumps' headers that differ.
-    pub fields: Vec<Field>,
+    pub fields: Vec<HeaderDifference>,
 }
 
 /// The pixels, or bytes of video memory, that differ.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Pixels {
+pub struct PixelDifference {
     /// The first difference: the leftmost on the uppermost line. In memory: the lowest plane at the lowest
     /// address.
-    pub first: Place,
+    pub first: PixelPosition,
     /// The expected value of the first difference.
     pub expected: u8,
     /// The actual value of the first difference.
@@ -133,9 +132,9 @@ pub struct Pixels {
     pub pages: Vec<usize>,
 }
 
-/// The place of a pixel.
+/// The position of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Place {
+pub struct PixelPosition {
     /// The plane.
     pub plane: usize,
     /// The distance from the left edge of the pixel's page.
@@ -143,12 +142,12 @@ pub struct Place {
     /// The distance from the top edge of the pixel's page.
     pub y: usize,
     /// The address in video memory, if all of it was compared.
-    pub memory: Option<Address>,
+    pub memory: Option<MemoryAddress>,
 }
 
 /// The address of a byte in video memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Address {
+pub struct MemoryAddress {
     /// The address in the plane.
     pub address: u16,
     /// The page that contains the byte; `None` past the last page.
@@ -170,7 +169,7 @@ pub struct Bounds {
 
 /// The palette entries that differ.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Colours {
+pub struct PaletteDifference {
     /// The index of the first entry that differs.
     pub first: usize,
     /// The expected colour of the first entry; `None` if the expected palette is shorter.
@@ -185,7 +184,7 @@ pub struct Colours {
 
 /// A field of the dumps' headers that differs.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Field {
+pub struct HeaderDifference {
     /// The field's label.
     pub name: &'static str,
     /// The expected value.
@@ -194,27 +193,27 @@ pub struct Field {
     pub got: String,
 }
 
-/// The layout of a subject's pixels.
+/// The layout of a capture's pixels.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Shape {
+pub(crate) struct PixelLayout {
     /// Pixels in a line.
     pub width: usize,
     /// The lines of a page, if the pixels are all of video memory; `None` for a single page.
     pub memory: Option<usize>,
 }
 
-impl Shape {
-    pub fn place(&self, i: usize) -> Place {
+impl PixelLayout {
+    pub fn place(&self, i: usize) -> PixelPosition {
         let (x, y) = (i % self.width, i / self.width);
         let (y, memory) = match self.memory {
             None => (y, None),
             Some(height) => {
                 let page = Some(y / height).filter(|&page| page < self.pages(height));
                 let address = (i / 4) as u16;
-                (y % height, Some(Address { address, page }))
+                (y % height, Some(MemoryAddress { address, page }))
             }
         };
-        Place {
+        PixelPosition {
             plane: i & 3,
             x,
             y,
@@ -228,14 +227,14 @@ impl Shape {
     }
 
     /// Compares pixels of this layout; `None` if they are equal.
-    pub fn compare(&self, expected: &[u8], got: &[u8]) -> Option<Pixels> {
+    pub fn compare(&self, expected: &[u8], got: &[u8]) -> Option<PixelDifference> {
         let mut planes = [0; 4];
         let mut pages = match self.memory {
             Some(height) => vec![0; self.pages(height) + 1],
             None => Vec::new(),
         };
         let past = pages.len().saturating_sub(1);
-        let mut found: Option<Pixels> = None;
+        let mut found: Option<PixelDifference> = None;
         for (i, (&expected, &got)) in expected.iter().zip(got).enumerate() {
             if expected == got {
                 continue;
@@ -246,7 +245,7 @@ impl Shape {
                 pages[memory.page.unwrap_or(past)] += 1;
             }
             let (x, y) = (i % self.width, i / self.width);
-            let pixels = found.get_or_insert(Pixels {
+            let pixels = found.get_or_insert(PixelDifference {
                 first: place,
                 expected,
                 got,
@@ -270,7 +269,7 @@ impl Shape {
             };
         }
         let found = found?;
-        Some(Pixels {
+        Some(PixelDifference {
             count: planes.iter().sum(),
             of: expected.len(),
             planes,
@@ -280,24 +279,24 @@ impl Shape {
     }
 }
 
-/// Compares two subjects; `None` if they are equal. A dump and a PNG are compared as frames.
+/// Compares two captures; `None` if they are equal. A dump and a PNG are compared as frames.
 ///
 /// # Errors
-/// Subjects that cannot be compared: different contents, sizes or models, or palettes that hold the same
+/// Captures that cannot be compared: different contents, sizes or models, or palettes that hold the same
 /// colours in a different order. Some programs reorder a PNG's palette, and the indices then mean nothing.
-pub fn compare(expected: &Subject, got: &Subject) -> anyhow::Result<Option<Difference>> {
+pub fn compare(expected: &Capture, got: &Capture) -> anyhow::Result<Option<Difference>> {
     let difference = match (expected, got) {
-        (Subject::Dump(expected), Subject::Dump(got)) => compare_dumps(expected, got)?,
+        (Capture::Dump(expected), Capture::Dump(got)) => compare_dumps(expected, got)?,
         (expected, got) => {
             let (expected, got) = (expected.frame(), got.frame());
             same_size((expected.width, expected.height), (got.width, got.height))?;
             same_order(&expected.palette, &got.palette)?;
-            let shape = Shape {
+            let layout = PixelLayout {
                 width: expected.width,
                 memory: None,
             };
             Difference {
-                pixels: shape.compare(&expected.pixels, &got.pixels),
+                pixels: layout.compare(&expected.pixels, &got.pixels),
                 palette: compare_palettes(&expected.palette, &got.palette),
                 fields: Vec::new(),
             }
@@ -310,7 +309,7 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
     let (a, b) = (&expected.header, &got.header);
     if a.content != b.content {
         bail!(
-            "expected is a dump of {}, got one of {}; take both alike",
+            "expected is a dump of {}, got a dump of {}; take both with --all or both without",
             content(a.content),
             content(b.content)
         );
@@ -320,7 +319,7 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
         && expected != got
     {
         bail!(
-            "they show different models: expected is of the model file {expected:08x}, got of \
+            "the dumps show different models: expected has the model file {expected:08x}, got has \
              {got:08x}; take both with the same --model and --texture"
         );
     }
@@ -351,17 +350,17 @@ fn compare_dumps(expected: &Dump, got: &Dump) -> anyhow::Result<Difference> {
             format!("{:04x}", b.start),
         ),
     ];
-    let field = |(name, expected, got)| Field {
+    let field = |(name, expected, got)| HeaderDifference {
         name,
         expected,
         got,
     };
-    let shape = Shape {
+    let layout = PixelLayout {
         width: a.width.into(),
         memory: (a.content == Content::Memory).then_some(a.height.into()),
     };
     Ok(Difference {
-        pixels: shape.compare(&expected.pixels, &got.pixels),
+        pixels: layout.compare(&expected.pixels, &got.pixels),
         palette: compare_palettes(&expected.palette, &got.palette),
         fields: fields
             .into_iter()
@@ -381,7 +380,7 @@ fn content(content: Content) -> &'static str {
 fn same_size<T: PartialEq + fmt::Display>(expected: (T, T), got: (T, T)) -> anyhow::Result<()> {
     if expected != got {
         bail!(
-            "expected is {} x {}, got {} x {}",
+            "expected is {} x {} pixels, got is {} x {}; both must have the same size",
             expected.0,
             expected.1,
             got.0,
@@ -401,19 +400,19 @@ fn same_order(expected: &[Rgb6], got: &[Rgb6]) -> anyhow::Result<()> {
     if set(expected) == set(got) {
         bail!(
             "the palettes hold the same colours in another order (entry {entry:02x}: expected {}, \
-             got {}); indices can't be compared",
-            Colour(*a),
-            Colour(*b)
+             got {}), so indices cannot be compared; give the PNG as this program wrote it",
+            HexColour(*a),
+            HexColour(*b)
         );
     }
     Ok(())
 }
 
-fn compare_palettes(expected: &[Rgb6], got: &[Rgb6]) -> Option<Colours> {
+fn compare_palettes(expected: &[Rgb6], got: &[Rgb6]) -> Option<PaletteDifference> {
     let of = expected.len().max(got.len());
     let mut entries = differing_entries(expected, got);
     let first = entries.next()?;
-    Some(Colours {
+    Some(PaletteDifference {
         first,
         expected: expected.get(first).copied(),
         got: got.get(first).copied(),
@@ -429,9 +428,9 @@ pub(crate) fn differing_entries(expected: &[Rgb6], got: &[Rgb6]) -> impl Iterato
 }
 
 /// A colour, in the notation of dumps.
-pub(crate) struct Colour(pub Rgb6);
+pub(crate) struct HexColour(pub Rgb6);
 
-impl fmt::Display for Colour {
+impl fmt::Display for HexColour {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [red, green, blue] = self.0;
         write!(f, "{red:02x}{green:02x}{blue:02x}")
@@ -440,7 +439,7 @@ impl fmt::Display for Colour {
 
 /// Returns an entry's colour in the notation of dumps, or `nothing` for a missing entry.
 pub(crate) fn colour(colour: Option<Rgb6>) -> String {
-    colour.map_or("nothing".into(), |colour| Colour(colour).to_string())
+    colour.map_or("nothing".into(), |colour| HexColour(colour).to_string())
 }
 
 impl Difference {
@@ -469,7 +468,7 @@ fn differ(f: &mut fmt::Formatter<'_>, count: usize, of: usize, what: &str) -> fm
     write!(f, "{count} of {of} {what} differ{s}")
 }
 
-impl fmt::Display for Pixels {
+impl fmt::Display for PixelDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let memory = !self.pages.is_empty();
         let what = if memory { "bytes" } else { "pixels" };
@@ -499,7 +498,7 @@ impl fmt::Display for Pixels {
     }
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for PixelPosition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             plane,
@@ -509,7 +508,7 @@ impl fmt::Display for Place {
         } = self;
         match memory {
             None => write!(f, "plane {plane}, x {x}, y {y}"),
-            Some(Address { address, page }) => {
+            Some(MemoryAddress { address, page }) => {
                 write!(f, "plane {plane}, address {address:04x} ")?;
                 match page {
                     Some(page) => write!(f, "(page {page}, x {x}, y {y})"),
@@ -527,7 +526,7 @@ impl fmt::Display for Bounds {
     }
 }
 
-impl fmt::Display for Colours {
+impl fmt::Display for PaletteDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         differ(f, self.count, self.of, "palette entries")?;
         let (expected, got) = (colour(self.expected), colour(self.got));
@@ -536,7 +535,7 @@ impl fmt::Display for Colours {
     }
 }
 
-impl fmt::Display for Field {
+impl fmt::Display for HeaderDifference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             name,
@@ -549,44 +548,14 @@ impl fmt::Display for Field {
 
 #[cfg(test)]
 mod tests {
-    use protocol::dump::Header;
-    use protocol::{FrameName, Word};
-
     use super::*;
 
-    /// Returns a palette of 256 different colours.
-    fn palette() -> modex::Palette {
-        std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8])
-    }
-
-    fn dump(content: Content) -> Dump {
-        let pixels = match content {
-            Content::Page => 320 * 240,
-            Content::Memory => 4 * PLANE_BYTES,
-        };
-        Dump {
-            header: Header {
-                content,
-                scene: "ball".into(),
-                model_file: None,
-                mapper: Word::new("exact"),
-                frame: Some(FrameName::Number(480)),
-                motion: None,
-                start: 0x4B00,
-                width: 320,
-                height: 240,
-            },
-            palette: palette(),
-            pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
-        }
-    }
-
     /// Returns the result of [`compare`] for a dump and a copy that `change` has modified, as text.
-    fn told(content: Content, change: impl FnOnce(&mut Dump)) -> String {
-        let expected = dump(content);
+    fn described(content: Content, change: impl FnOnce(&mut Dump)) -> String {
+        let expected = Dump::example(content);
         let mut got = expected.clone();
         change(&mut got);
-        let [expected, got] = [expected, got].map(Subject::Dump);
+        let [expected, got] = [expected, got].map(Capture::Dump);
         match compare(&expected, &got) {
             Ok(None) => "equal".into(),
             Ok(Some(difference)) => difference.to_string(),
@@ -595,14 +564,14 @@ mod tests {
     }
 
     #[test]
-    fn a_page_is_told_by_its_first_pixel_their_number_and_their_box() {
-        assert_eq!(told(Content::Page, |_| {}), "equal");
-        let one = told(Content::Page, |got| got.pixels[12 * 320 + 33] ^= 0xFF);
+    fn differing_pixels_of_a_page_are_described_by_their_number_the_first_and_their_box() {
+        assert_eq!(described(Content::Page, |_| {}), "equal");
+        let one = described(Content::Page, |got| got.pixels[12 * 320 + 33] ^= 0xFF);
         assert_eq!(
             one,
             "1 of 76800 pixels differs, first plane 1, x 33, y 12: expected 6c, got 93"
         );
-        let three = told(Content::Page, |got| {
+        let three = described(Content::Page, |got| {
             for (x, y) in [(319, 12), (2, 100), (40, 239)] {
                 got.pixels[y * 320 + x] += 1;
             }
@@ -612,7 +581,7 @@ mod tests {
             "3 of 76800 pixels differ, first plane 3, x 319, y 12: expected 8f, got 90; \
              all in x 2..319, y 12..239, ends included"
         );
-        let all = told(Content::Page, |got| {
+        let all = described(Content::Page, |got| {
             got.pixels.iter_mut().for_each(|p| *p += 1);
         });
         assert!(
@@ -623,10 +592,10 @@ mod tests {
     }
 
     #[test]
-    fn memory_is_told_by_plane_address_and_page() {
-        assert_eq!(told(Content::Memory, |_| {}), "equal");
+    fn differing_bytes_of_memory_are_described_by_plane_address_and_page() {
+        assert_eq!(described(Content::Memory, |_| {}), "equal");
         let at = |plane: usize, address: usize| 4 * address + plane;
-        let some = told(Content::Memory, |got| {
+        let some = described(Content::Memory, |got| {
             // The last bytes of page 0 and of memory, and two bytes of page 2. The first difference is not in
             // plane 0.
             for i in [
@@ -644,18 +613,18 @@ mod tests {
              expected f4, got f5; in plane 0: 2, 1: 0, 2: 1, 3: 1; in page 0: 1; in page 2: 2; \
              past the last page: 1"
         );
-        let past = told(Content::Memory, |got| got.pixels[at(1, 0xE100)] ^= 1);
+        let past = described(Content::Memory, |got| got.pixels[at(1, 0xE100)] ^= 1);
         assert!(
             past.contains("first plane 1, address e100 (past the last page): "),
             "{past}"
         );
-        let before = told(Content::Memory, |got| got.pixels[at(3, 0xE0FF)] ^= 1);
+        let before = described(Content::Memory, |got| got.pixels[at(3, 0xE0FF)] ^= 1);
         assert!(before.contains("e0ff (page 2, x 319, y 239)"), "{before}");
     }
 
     #[test]
-    fn palette_and_header_are_told_for_themselves() {
-        let palette = told(Content::Page, |got| {
+    fn differences_in_palette_and_header_are_described_separately() {
+        let palette = described(Content::Page, |got| {
             got.palette[3] = [0x2A, 0x1C, 0x0F];
             got.palette[255][0] ^= 1;
         });
@@ -663,9 +632,9 @@ mod tests {
             palette,
             "2 of 256 palette entries differ, first 03: expected 000303, got 2a1c0f"
         );
-        let start = told(Content::Page, |got| got.header.start = 0);
+        let start = described(Content::Page, |got| got.header.start = 0);
         assert_eq!(start, "start: expected 4b00, got 0000");
-        let all = told(Content::Memory, |got| {
+        let all = described(Content::Memory, |got| {
             got.pixels[0] = 9;
             got.palette[0] = [1, 1, 1];
             got.header.scene = "cube".into();
@@ -678,37 +647,41 @@ mod tests {
              1 of 256 palette entries differs, first 00: expected 000000, got 010101; \
              scene: expected ball, got cube; frame: expected 480, got none"
         );
-        let model = told(Content::Page, |got| got.header.model_file = Some(0x1A2B));
+        let model = described(Content::Page, |got| got.header.model_file = Some(0x1A2B));
         assert_eq!(model, "model: expected none, got 00001a2b");
     }
 
     #[test]
     fn dumps_of_other_content_or_size_are_not_compared() {
-        let content = told(Content::Page, |got| *got = dump(Content::Memory));
+        let content = described(Content::Page, |got| *got = Dump::example(Content::Memory));
         assert_eq!(
             content,
-            "error: expected is a dump of a page, got one of all memory; take both alike"
+            "error: expected is a dump of a page, got a dump of all memory; take both with --all or both \
+             without"
         );
-        let size = told(Content::Page, |got| got.header.height = 200);
-        assert_eq!(size, "error: expected is 320 x 240, got 320 x 200");
+        let size = described(Content::Page, |got| got.header.height = 200);
+        assert_eq!(
+            size,
+            "error: expected is 320 x 240 pixels, got is 320 x 200; both must have the same size"
+        );
     }
 
     #[test]
     fn a_dump_is_compared_with_a_frame_as_a_frame() {
         for content in [Content::Page, Content::Memory] {
-            let dump = dump(content);
+            let dump = Dump::example(content);
             let mut frame = dump.frame();
-            let dump = Subject::Dump(dump);
-            let same = Subject::Png(frame.clone());
+            let dump = Capture::Dump(dump);
+            let same = Capture::Png(frame.clone());
             assert_eq!(compare(&dump, &same).unwrap(), None);
             assert_eq!(compare(&same, &dump).unwrap(), None);
             frame.pixels[321] ^= 1;
-            let difference = compare(&Subject::Png(frame), &dump);
+            let difference = compare(&Capture::Png(frame), &dump);
             let pixels = difference.unwrap().unwrap().pixels.unwrap();
             assert_eq!((pixels.count, pixels.of), (1, 320 * 240));
             assert_eq!(
                 pixels.first,
-                Place {
+                PixelPosition {
                     plane: 1,
                     x: 1,
                     y: 1,
@@ -719,19 +692,18 @@ mod tests {
     }
 
     #[test]
-    fn a_frames_palette_may_differ_but_not_be_in_another_order() {
-        let frame = dump(Content::Page).frame();
+    fn palettes_may_differ_but_not_hold_the_same_colours_in_another_order() {
+        let frame = Dump::example(Content::Page).frame();
         let with = |change: &dyn Fn(&mut Vec<Rgb6>)| {
             let mut other = frame.clone();
             change(&mut other.palette);
-            let subject = Subject::Png(frame.clone());
-            compare(&subject, &Subject::Png(other))
+            compare(&Capture::Png(frame.clone()), &Capture::Png(other))
         };
         let error = with(&|palette| palette.swap(3, 200)).unwrap_err();
         assert_eq!(
             error.to_string(),
             "the palettes hold the same colours in another order (entry 03: expected 000303, \
-             got 320800); indices can't be compared"
+             got 320800), so indices cannot be compared; give the PNG as this program wrote it"
         );
         let palette = |difference: anyhow::Result<Option<Difference>>| {
             difference.unwrap().unwrap().palette.unwrap()

@@ -1,8 +1,8 @@
 //! Reads dumps on the host, checks each line, and writes them again.
 //!
-//! [`protocol::dump`] defines the format. The reader trusts nothing: each line must have a correct checksum and
-//! the expected label, and the last line's count and checksum must match the lines before it. So a missing,
-//! repeated or misplaced line is reported by its number.
+//! [`protocol::dump`] defines the format. The reader trusts nothing: each line must have a correct checksum
+//! and the expected label, and the last line's count and checksum must match the lines before it. So a
+//! missing, repeated or misplaced line is reported by its number.
 
 use std::fmt;
 use std::io::{self, Write};
@@ -13,10 +13,10 @@ use protocol::dump::{
 };
 use protocol::{Content, FrameName, Lines, Motion, Word};
 
-use crate::indexed::Indexed;
+use crate::indexed::IndexedImage;
 use system::quote::quoted;
 
-/// The contents of a VGA: its palette, and the pixels of a page or of all video memory.
+/// A dump: a VGA's palette, and the pixels of a page or of all video memory.
 #[derive(Clone, PartialEq, Eq)]
 pub struct Dump {
     /// The frame in the dump, and how it was drawn.
@@ -33,29 +33,53 @@ impl fmt::Debug for Dump {
     }
 }
 
-/// Why a text is not a valid dump.
+/// The reason why a text is not a valid dump.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NoDump {
+pub struct DumpError {
     /// The number of the invalid line, counted from 1.
     pub line: usize,
     /// What is wrong with the line.
     pub why: String,
 }
 
-impl fmt::Display for NoDump {
+impl fmt::Display for DumpError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "line {}: {}", self.line, self.why)
     }
 }
 
-impl std::error::Error for NoDump {}
+impl std::error::Error for DumpError {}
 
 impl Dump {
+    /// Returns a dump of an artificial frame: an example for tests and documentation. All colours differ, and
+    /// equal pixels are far apart.
+    pub fn example(content: Content) -> Self {
+        let pixels = match content {
+            Content::Page => modex::WIDTH * modex::HEIGHT,
+            Content::Memory => 4 * PLANE_BYTES,
+        };
+        Self {
+            header: Header {
+                content,
+                scene: "ball".into(),
+                model_file: None,
+                mapper: Word::new("exact"),
+                frame: Some(FrameName::Number(480)),
+                motion: None,
+                start: 0x4B00,
+                width: modex::WIDTH as u16,
+                height: modex::HEIGHT as u16,
+            },
+            palette: std::array::from_fn(|i| [(i >> 2) as u8, (i & 0x3F) as u8, (i & 3) as u8]),
+            pixels: (0..pixels).map(|i| (i % 251) as u8).collect(),
+        }
+    }
+
     /// Reads a dump from a file's bytes: lines with their checksums, ended by LF or CR LF.
     ///
     /// # Errors
     /// The first invalid line.
-    pub fn read(bytes: &[u8]) -> Result<Self, NoDump> {
+    pub fn read(bytes: &[u8]) -> Result<Self, DumpError> {
         let (mut lines, mut texts) = (Lines::new(), Vec::new());
         for &byte in bytes {
             let Some(line) = lines.push(byte) else {
@@ -70,17 +94,17 @@ impl Dump {
             // For a file of an entirely different kind, the error says that it is not a dump, not what its
             // bytes are.
             let first = texts.is_empty();
-            texts.push(text.map_err(|why| NoDump {
+            texts.push(text.map_err(|why| DumpError {
                 line: texts.len() + 1,
-                why: if first { no_dump(&why) } else { why },
+                why: if first { not_a_dump(&why) } else { why },
             })?);
         }
         if !bytes.is_empty() && !bytes.ends_with(b"\n") {
-            return Err(NoDump {
+            return Err(DumpError {
                 line: texts.len() + 1,
                 why: match texts.is_empty() {
-                    true => no_dump("it has no end"),
-                    false => "it is cut short: the line has no end".into(),
+                    true => not_a_dump("the line has no end"),
+                    false => "the dump is cut short: this line has no end".into(),
                 },
             });
         }
@@ -91,13 +115,13 @@ impl Dump {
     ///
     /// # Errors
     /// As [`Dump::read`].
-    pub fn from_lines(lines: &[impl AsRef<str>]) -> Result<Self, NoDump> {
-        let mut reader = Reader {
+    pub fn from_lines(lines: &[impl AsRef<str>]) -> Result<Self, DumpError> {
+        let mut reader = DumpReader {
             lines: lines.iter().map(AsRef::as_ref).collect(),
             read: 0,
             whole: DumpChecksum::default(),
         };
-        reader.dump().map_err(|why| NoDump {
+        reader.dump().map_err(|why| DumpError {
             line: reader.read.max(1),
             why,
         })
@@ -161,7 +185,7 @@ impl Dump {
     }
 
     /// Returns the frame on the screen.
-    pub fn frame(&self) -> Indexed {
+    pub fn frame(&self) -> IndexedImage {
         let Header {
             width,
             height,
@@ -178,7 +202,7 @@ impl Dump {
                 pixels
             }
         };
-        Indexed {
+        IndexedImage {
             width: width.into(),
             height: height.into(),
             palette: self.palette.to_vec(),
@@ -190,40 +214,40 @@ impl Dump {
 /// The oldest version of the format that can be read.
 const OLDEST: u32 = 3;
 
-fn no_dump(why: &str) -> String {
-    format!("it is no dump: it does not begin with '{MAGIC} {VERSION}' ({why})")
+fn not_a_dump(why: &str) -> String {
+    format!("not a dump: a dump begins with '{MAGIC} {VERSION}' ({why})")
 }
 
 /// Parses the lines of a dump, one after the other.
-struct Reader<'a> {
+struct DumpReader<'a> {
     lines: Vec<&'a str>,
     read: usize,
     whole: DumpChecksum,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> DumpReader<'a> {
     /// Returns the rest of the next line, which must begin with `label`.
     fn line(&mut self, label: &str) -> Result<&'a str, String> {
         let found = self.lines.get(self.read).copied();
         self.read += 1;
         let Some(line) = found else {
-            return Err(format!("it is cut short: '{label}' should come here"));
+            return Err(format!("the dump is cut short: expected '{label}'"));
         };
         let rest = line
             .strip_prefix(label)
             .and_then(|rest| rest.strip_prefix(' '));
-        let rest = rest.ok_or_else(|| format!("{} stands where '{label}' should", quoted(line)))?;
+        let rest = rest.ok_or_else(|| format!("expected '{label}', found {}", quoted(line)))?;
         self.whole.add(format_args!("{line}"));
         Ok(rest)
     }
 
     fn dump(&mut self) -> Result<Dump, String> {
-        let version = self.line(MAGIC).map_err(|why| no_dump(&why))?;
+        let version = self.line(MAGIC).map_err(|why| not_a_dump(&why))?;
         let version = match version.parse() {
             Ok(version @ OLDEST..=VERSION) => version,
             _ => {
                 return Err(format!(
-                    "it is a dump of version {}; this program reads versions {OLDEST} to {VERSION}",
+                    "dump version {} is not supported; this program reads versions {OLDEST} to {VERSION}",
                     version
                         .parse::<u32>()
                         .map_or(quoted(version), |known| known.to_string())
@@ -237,22 +261,22 @@ impl<'a> Reader<'a> {
             let digits = self.line(&row.to_string())?;
             let before = pixels.len();
             hex(digits, &mut pixels)?;
-            let there = pixels.len() - before;
-            if there != row.pixels {
-                return Err(format!("it has {there} pixels, not {}", row.pixels));
+            let found = pixels.len() - before;
+            if found != row.pixels {
+                return Err(format!("expected {} pixels, found {found}", row.pixels));
             }
         }
         let end = self.whole.to_string();
-        let said = self.line("end")?;
-        if format!("end {said}") != end {
+        let found = format!("end {}", self.line("end")?);
+        if found != end {
             return Err(format!(
-                "it ends in {}, but the lines before it make '{end}'",
-                quoted(said)
+                "the lines before this line add up to '{end}', found {}",
+                quoted(found)
             ));
         }
         if self.read < self.lines.len() {
             self.read += 1;
-            return Err("there is more after the dump's end".into());
+            return Err("expected the end of the dump, found another line".into());
         }
         Ok(Dump {
             header,
@@ -267,11 +291,12 @@ impl<'a> Reader<'a> {
             "memory" => Content::Memory,
             other => {
                 let other = quoted(other);
-                return Err(format!("content is 'page' or 'memory', not {other}"));
+                return Err(format!("expected 'page' or 'memory', found {other}"));
             }
         };
         let scene = self.line("scene")?;
-        let scene = Word::new(scene).ok_or_else(|| format!("{} is no scene", quoted(scene)))?;
+        let scene =
+            Word::new(scene).ok_or_else(|| format!("{} is not a scene's name", quoted(scene)))?;
         // Version 5 renamed two lines.
         let (model, frame) = match version {
             ..5 => ("pack", "picture"),
@@ -284,19 +309,22 @@ impl<'a> Reader<'a> {
                 hex(digits, &mut checksum)?;
                 let checksum: [u8; 4] = checksum
                     .try_into()
-                    .map_err(|_| "a model file's checksum has eight digits")?;
+                    .map_err(|_| "a model file's checksum has eight hex digits")?;
                 Some(u32::from_be_bytes(checksum))
             }
         };
         let mapper = match self.line("mapper")? {
             "none" => None,
-            name => Some(Word::new(name).ok_or_else(|| format!("{} is no mapper", quoted(name)))?),
+            name => Some(
+                Word::new(name)
+                    .ok_or_else(|| format!("{} is not a mapper's name", quoted(name)))?,
+            ),
         };
         let frame = match self.line(frame)? {
             "none" => None,
             name => Some(
                 FrameName::parse(name.split(' '))
-                    .ok_or_else(|| format!("{} is no frame", quoted(name)))?,
+                    .ok_or_else(|| format!("{} is not a frame's name", quoted(name)))?,
             ),
         };
         // Version 3 named a mapper before the first frame, and had no line `motion`.
@@ -306,7 +334,10 @@ impl<'a> Reader<'a> {
             _ => match self.line("motion")? {
                 "none" => None,
                 parts => Some(Motion::parse(parts.split(' ')).ok_or_else(|| {
-                    format!("{} is no motion: it has four hex numbers", quoted(parts))
+                    format!(
+                        "{} is not a motion; a motion has four hex numbers",
+                        quoted(parts)
+                    )
                 })?),
             },
         };
@@ -314,7 +345,7 @@ impl<'a> Reader<'a> {
         hex(self.line("start")?, &mut start)?;
         let start: [u8; 2] = start
             .try_into()
-            .map_err(|_| "a start address has four digits")?;
+            .map_err(|_| "a start address has four hex digits")?;
         let size = self.line("size")?;
         let sides = size.split_once(' ');
         let sides = sides.and_then(|(w, h)| Some((w.parse::<u16>().ok()?, h.parse::<u16>().ok()?)));
@@ -328,7 +359,10 @@ impl<'a> Reader<'a> {
         };
         let (width, height) = sides.filter(legal).ok_or_else(|| {
             let size = quoted(size);
-            format!("{size} is no size: a width in fours up to {MAX_WIDTH}, and a height")
+            format!(
+                "{size} is not a size; a size is a width, which is a multiple of 4 up to {MAX_WIDTH}, \
+                 and a height"
+            )
         })?;
         Ok(Header {
             content,
@@ -352,12 +386,14 @@ impl<'a> Reader<'a> {
                 hex(colour, &mut parts)?;
                 if parts.len() - before != 3 || parts[before..].iter().any(|&part| part > 0x3F) {
                     let colour = quoted(colour);
-                    return Err(format!("{colour} is no colour: three parts of 00 to 3f"));
+                    return Err(format!(
+                        "{colour} is not a colour; a colour has three parts from 00 to 3f"
+                    ));
                 }
             }
-            let there = parts.len() / 3 - first;
-            if there != COLOURS_A_LINE {
-                return Err(format!("it has {there} colours, not {COLOURS_A_LINE}"));
+            let found = parts.len() / 3 - first;
+            if found != COLOURS_A_LINE {
+                return Err(format!("expected {COLOURS_A_LINE} colours, found {found}"));
             }
         }
         let (colours, _) = parts.as_chunks::<3>();
@@ -382,7 +418,7 @@ fn hex(digits: &str, bytes: &mut Vec<u8>) -> Result<(), String> {
             _ => None,
         };
         bytes.push(
-            byte.ok_or_else(|| format!("{} is no pair of digits 0 to 9 and a to f", quoted(pair)))?,
+            byte.ok_or_else(|| format!("{} is not two hex digits (0 to 9, a to f)", quoted(pair)))?,
         );
     }
     Ok(())
@@ -393,26 +429,14 @@ mod tests {
     use super::*;
 
     fn dump() -> Dump {
-        Dump {
-            header: Header {
-                content: Content::Page,
-                scene: "cube".into(),
-                model_file: None,
-                mapper: Word::new("exact"),
-                frame: Some(FrameName::Number(7)),
-                motion: Some(Motion {
-                    yaw: 1,
-                    pitch: u32::MAX,
-                    roll: 0,
-                    distance: 0xFFFF_0000,
-                }),
-                start: 0,
-                width: 320,
-                height: 240,
-            },
-            palette: [[1, 2, 3]; 256],
-            pixels: vec![7; 320 * 240],
-        }
+        let mut dump = Dump::example(Content::Page);
+        dump.header.motion = Some(Motion {
+            yaw: 1,
+            pitch: u32::MAX,
+            roll: 0,
+            distance: 0xFFFF_0000,
+        });
+        dump
     }
 
     /// Returns the lines with a new last line that matches the lines before it.
@@ -427,13 +451,13 @@ mod tests {
     }
 
     #[test]
-    fn a_header_comes_back_with_its_motion_and_without_a_frame() {
+    fn a_header_with_a_motion_and_a_header_without_a_frame_are_read_back() {
         let mut dump = dump();
         assert_eq!(
             dump.lines()[4..7],
             [
                 "mapper exact",
-                "frame 7",
+                "frame 480",
                 "motion 00000001 ffffffff 00000000 ffff0000"
             ]
         );
@@ -447,8 +471,8 @@ mod tests {
         assert_eq!(Dump::from_lines(&dump.lines()).unwrap(), dump);
     }
 
-    /// Returns the lines with the words of versions 3 and 4.
-    fn old_words(lines: Vec<String>) -> Vec<String> {
+    /// Returns the lines with the labels of versions 3 and 4.
+    fn old_labels(lines: Vec<String>) -> Vec<String> {
         let old = |line: String| match line.split_once(' ') {
             Some(("model", checksum)) => format!("pack {checksum}"),
             Some(("frame", name)) => format!("picture {name}"),
@@ -458,21 +482,21 @@ mod tests {
     }
 
     #[test]
-    fn version_4_is_read_with_its_own_words() {
-        let mut lines = old_words(dump().lines());
+    fn version_4_is_read_with_the_labels_of_version_4() {
+        let mut lines = old_labels(dump().lines());
         lines[0] = format!("{MAGIC} 4");
         assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), dump());
         lines[0] = format!("{MAGIC} 5");
         let error = Dump::from_lines(&ended(lines)).unwrap_err();
         assert_eq!(error.line, 4);
-        assert!(error.why.contains("'model' should"), "{error}");
+        assert!(error.why.contains("expected 'model'"), "{error}");
     }
 
     #[test]
     fn version_3_is_read_as_a_dump_without_motion() {
         let mut old = dump();
         old.header.motion = None;
-        let mut lines = old_words(old.lines());
+        let mut lines = old_labels(old.lines());
         lines[0] = format!("{MAGIC} 3");
         assert_eq!(lines.remove(6), "motion none");
         assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), old);
@@ -483,17 +507,17 @@ mod tests {
         lines[0] = format!("{MAGIC} 4");
         let error = Dump::from_lines(&ended(lines)).unwrap_err();
         assert_eq!(error.line, 7);
-        assert!(error.why.contains("'motion' should"), "{error}");
+        assert!(error.why.contains("expected 'motion'"), "{error}");
     }
 
     #[test]
-    fn other_versions_and_motions_are_refused_by_line() {
+    fn an_unknown_version_or_a_wrong_motion_is_refused_with_its_line() {
         for (at, line, why) in [
             (0, "crystal-ball dump 2", "reads versions 3 to 5"),
             (0, "crystal-ball dump 6", "reads versions 3 to 5"),
             (0, "crystal-ball dump four", "version 'four'"),
-            (6, "motion 1 2 3", "it has four hex numbers"),
-            (6, "motion 1 2 3 -4", "it has four hex numbers"),
+            (6, "motion 1 2 3", "a motion has four hex numbers"),
+            (6, "motion 1 2 3 -4", "a motion has four hex numbers"),
         ] {
             let mut lines = dump().lines();
             lines[at] = line.into();

@@ -3,14 +3,14 @@
 //! A golden is two files of the same name in `tests/golden`. `NAME.toml` is the description:
 //!
 //! ```toml
-//! about = "The ball from so near that each of the screen's edges cuts it."
+//! about = "The ball, so close that each edge of the screen cuts it."
 //! show = ["0", "pose 00000000 00000000 00000000 00013333"]
 //! mapper = "linear-16"      # may be left out, as may be `scene` and `order`
 //! ```
 //!
 //! `NAME.png` is the last of the frames in `show`, as an indexed PNG. The folder is the list of goldens, so
-//! none can be forgotten: a PNG without a description is an error, and a description without a PNG fails its
-//! check.
+//! no golden can be forgotten: a PNG without a description is an error, and a description without a PNG
+//! fails its check.
 //!
 //! QEMU's VGA, the emulated VGA, the PNG and QEMU's screen must agree:
 //!
@@ -26,8 +26,8 @@
 //! pass the screendump, which is compared without a checksum: the wrong byte's colour would have to be equal.
 //! Checksums cannot show a fault in how bytes are sent and read, so some goldens send their bytes.
 //!
-//! Both VGAs run the same program and renderer, so equal VGAs alone would prove little about the frame. The
-//! PNG is what a person once looked at.
+//! Both VGAs run the same program and renderer, so equal VGAs alone would prove little about the frame. A
+//! person looked at each PNG before it was committed.
 
 use std::fmt;
 use std::fs::File;
@@ -40,14 +40,14 @@ use scene::catalogue::Entry;
 use serde::Deserialize;
 use texmap::{Mapper, Order};
 
-use crate::card::{self, Card, Emulated};
-use crate::difference::{Difference, Subject, compare};
-use crate::indexed::Indexed;
-use crate::look::{Look, Named};
+use crate::backend::{self, Backend, EmulatedDemo};
+use crate::difference::{Capture, Difference, compare};
+use crate::indexed::IndexedImage;
+use crate::options::FrameOptions;
 use crate::report::Report;
-use crate::screen::Screen;
+use crate::rgb::RgbImage;
 use system::Step;
-use system::quote::{printable, quoted};
+use system::quote::{self, printable, quoted};
 use system::write_atomically;
 
 /// A golden frame.
@@ -60,7 +60,7 @@ pub struct Golden {
     /// The frames to show after `hold`; the golden is the last.
     pub show: Vec<FrameName>,
     /// The options to draw with.
-    pub look: Look,
+    pub options: FrameOptions,
     /// The path of the golden's PNG.
     pub png: PathBuf,
 }
@@ -83,7 +83,7 @@ struct Description {
 /// file that is neither. A description without a PNG is legal here, because `bless` makes the PNG;
 /// [`Findings::check_golden`] reports it.
 pub fn find(folder: &Path) -> anyhow::Result<Vec<Golden>> {
-    let files = || format!("{} cannot be read", folder.display());
+    let files = || format!("{}: cannot be read", folder.display());
     let mut goldens = Vec::new();
     let mut pngs = Vec::new();
     for entry in std::fs::read_dir(folder).with_context(files)? {
@@ -91,7 +91,10 @@ pub fn find(folder: &Path) -> anyhow::Result<Vec<Golden>> {
         match path.extension().and_then(|ending| ending.to_str()) {
             Some("toml") => goldens.push(Golden::read(&path)?),
             Some("png") => pngs.push(path),
-            _ => bail!("{} is neither a description nor a PNG", path.display()),
+            _ => bail!(
+                "{}: neither a description (.toml) nor a PNG; move the file elsewhere",
+                path.display()
+            ),
         }
     }
     if let Some(orphan) = pngs
@@ -99,12 +102,19 @@ pub fn find(folder: &Path) -> anyhow::Result<Vec<Golden>> {
         .find(|png| goldens.iter().all(|g| g.png != **png))
     {
         bail!(
-            "{} is an orphan: it has no description beside it; write one, or remove the PNG",
-            orphan.display()
+            "{}: the description {} is missing; write it, or remove the PNG",
+            orphan.display(),
+            quote::path(
+                orphan
+                    .with_extension("toml")
+                    .file_name()
+                    .unwrap_or_default()
+                    .as_ref()
+            )
         );
     }
     if goldens.is_empty() {
-        bail!("{} has no golden frames", folder.display());
+        bail!("{}: the folder has no golden frames", folder.display());
     }
     goldens.sort_by(|a, b| a.name.cmp(&b.name));
     Ok(goldens)
@@ -112,30 +122,30 @@ pub fn find(folder: &Path) -> anyhow::Result<Vec<Golden>> {
 
 impl Golden {
     fn read(path: &Path) -> anyhow::Result<Self> {
-        let wrong = || format!("{} is no golden's description", path.display());
+        let wrong = || format!("{}: not a valid description of a golden", path.display());
         let text = std::fs::read_to_string(path).with_context(wrong)?;
         let description: Description = toml::from_str(&text)
             .map_err(|error| syntax(&text, &error))
             .with_context(wrong)?;
         let frames = description.show.iter().map(|name| {
             FrameName::parse(name.split(' '))
-                .with_context(|| format!("{} is no frame", quoted(name)))
+                .with_context(|| format!("{} is not a frame's name", quoted(name)))
         });
         let show = frames.collect::<Result<Vec<_>, _>>().with_context(wrong)?;
         if show.is_empty() {
-            return Err(anyhow::anyhow!("it shows nothing")).with_context(wrong);
+            return Err(anyhow::anyhow!("`show` is empty; name at least one frame"))
+                .with_context(wrong);
         }
-        let look = Look {
-            scene: known("scene", description.scene, Entry::parse)
-                .with_context(wrong)?
-                .map(|entry| Named(entry.name)),
+        let options = FrameOptions {
+            scene: known("scene", description.scene, |name| {
+                Entry::parse(name).map(|entry| entry.name)
+            })
+            .with_context(wrong)?,
             mapper: known("mapper", description.mapper, Mapper::parse).with_context(wrong)?,
-            order: known("order", description.order, Order::parse)
-                .with_context(wrong)?
-                .map(Named),
+            order: known("order", description.order, Order::parse).with_context(wrong)?,
         };
         Ok(Self {
-            look,
+            options,
             name: path
                 .file_stem()
                 .unwrap_or_default()
@@ -151,11 +161,11 @@ impl Golden {
     ///
     /// # Errors
     /// A file that cannot be read or is not an indexed PNG.
-    pub fn frame(&self) -> anyhow::Result<Option<Indexed>> {
-        let wrong = || format!("{} is no golden", self.png.display());
+    pub fn frame(&self) -> anyhow::Result<Option<IndexedImage>> {
+        let wrong = || format!("{}: cannot be read as a golden frame", self.png.display());
         match File::open(&self.png) {
             Ok(file) => Ok(Some(
-                Indexed::read_png(BufReader::new(file)).with_context(wrong)?,
+                IndexedImage::read_png(BufReader::new(file)).with_context(wrong)?,
             )),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error).with_context(wrong),
@@ -178,7 +188,7 @@ fn known<T>(
     parse: impl FnOnce(&str) -> Option<T>,
 ) -> anyhow::Result<Option<T>> {
     let Some(name) = name else { return Ok(None) };
-    let named = parse(&name).with_context(|| format!("there is no {what} {}", quoted(&name)))?;
+    let named = parse(&name).with_context(|| format!("unknown {what} {}", quoted(&name)))?;
     Ok(Some(named))
 }
 
@@ -188,14 +198,14 @@ pub struct Finding {
     /// The golden's name.
     pub golden: String,
     /// Which two things differ, and how.
-    pub words: String,
+    pub description: String,
     /// The expected and the actual side with their difference, if images can show it.
-    evidence: Option<Box<(Subject, Subject, Difference)>>,
+    evidence: Option<Box<(Capture, Capture, Difference)>>,
 }
 
 impl fmt::Display for Finding {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.golden, self.words)
+        write!(f, "{}: {}", self.golden, self.description)
     }
 }
 
@@ -223,23 +233,20 @@ impl Findings {
     pub fn check_golden(
         &mut self,
         golden: &Golden,
-        emulated: &mut Emulated<'_>,
+        emulated: &mut EmulatedDemo<'_>,
     ) -> anyhow::Result<()> {
-        emulated.show_as(&golden.look, &golden.show)?;
-        let drawn = Subject::Dump(emulated.dump(Content::Page)?);
+        emulated.show_with(&golden.options, &golden.show)?;
+        let drawn = Capture::Dump(emulated.dump(Content::Page)?);
         match golden.frame() {
             Ok(Some(frame)) => {
                 self.compare(
                     golden,
-                    "the emulated card and the golden",
-                    &Subject::Png(frame),
+                    "expected the golden, got the emulated VGA's frame",
+                    &Capture::Png(frame),
                     &drawn,
                 );
             }
-            Ok(None) => self.note(
-                golden,
-                "it was never blessed: `cargo bless` makes its PNG".into(),
-            ),
+            Ok(None) => self.note(golden, "the PNG is missing; `cargo bless` writes it".into()),
             Err(error) => self.note(golden, format!("{error:#}")),
         }
         Ok(())
@@ -252,12 +259,12 @@ impl Findings {
     pub fn check_cards(
         &mut self,
         golden: &Golden,
-        emulated: &mut Emulated<'_>,
-        machine: &mut impl Card,
+        emulated: &mut EmulatedDemo<'_>,
+        machine: &mut impl Backend,
         transfer: Transfer,
     ) -> anyhow::Result<()> {
-        emulated.show_as(&golden.look, &golden.show)?;
-        machine.show_as(&golden.look, &golden.show)?;
+        emulated.show_with(&golden.options, &golden.show)?;
+        machine.show_with(&golden.options, &golden.show)?;
         // The kernel has answered and waits for the next command, so it touches no video memory now.
         let screen = machine.screen()?;
         let held = self.check_memory(golden, emulated, machine)?;
@@ -267,21 +274,19 @@ impl Findings {
         if let Some(difference) = difference(&emulated.screen()?, &screen) {
             self.note(
                 golden,
-                format!("QEMU's screen and the emulated card's scan-out: {difference}"),
+                format!("screen: expected the emulated VGA's, got QEMU's: {difference}"),
             );
         }
         let [expected, got] = [
-            emulated.ask(Command::Registers)?,
-            machine.ask(Command::Registers)?,
+            emulated.send(Command::Registers)?,
+            machine.send(Command::Registers)?,
         ];
         for (expected, got) in expected.iter().zip(&got) {
             // QEMU has no PEL Mask.
             if expected != got && !expected.starts_with("pel-mask ") {
                 self.note(
                     golden,
-                    format!(
-                        "registers of QEMU's card are '{got}', of the emulated one '{expected}'"
-                    ),
+                    format!("registers: the emulated VGA has '{expected}', QEMU's VGA has '{got}'"),
                 );
             }
         }
@@ -293,25 +298,28 @@ impl Findings {
     fn check_memory(
         &mut self,
         golden: &Golden,
-        emulated: &mut Emulated<'_>,
-        machine: &mut impl Card,
+        emulated: &mut EmulatedDemo<'_>,
+        machine: &mut impl Backend,
     ) -> anyhow::Result<bool> {
         // Computed from outside the emulated VGA, so that the program, which both VGAs run, has no part in
         // it.
         let expected = emulated.dump(Content::Memory)?.checksums();
-        let got = machine.ask(Command::Checksums(Content::Memory))?;
+        let got = machine.send(Command::Checksums(Content::Memory))?;
         if got == expected {
             return Ok(true);
         }
         let differ = expected.iter().zip(&got).find(|(a, b)| a != b);
-        let words = match differ {
-            Some((expected, got)) => format!("expected '{expected}', got '{got}'"),
-            None => format!("expected {} lines, got {}", expected.len(), got.len()),
+        let difference = match differ {
+            Some((expected, got)) => {
+                format!("the emulated VGA has '{expected}', QEMU's VGA has '{got}'")
+            }
+            None => format!(
+                "the emulated VGA has {} lines, QEMU's VGA has {}",
+                expected.len(),
+                got.len()
+            ),
         };
-        self.note(
-            golden,
-            format!("checksums of QEMU's card and of the emulated card: {words}"),
-        );
+        self.note(golden, format!("checksums: {difference}"));
         self.check_bytes(golden, Content::Memory, emulated, machine)?;
         Ok(false)
     }
@@ -321,37 +329,33 @@ impl Findings {
         &mut self,
         golden: &Golden,
         content: Content,
-        emulated: &mut Emulated<'_>,
-        machine: &mut impl Card,
+        emulated: &mut EmulatedDemo<'_>,
+        machine: &mut impl Backend,
     ) -> anyhow::Result<()> {
-        let expected = Subject::Dump(emulated.dump(content)?);
-        let got = Subject::Dump(machine.dump(content)?);
-        self.compare(golden, "QEMU and the emulated card", &expected, &got);
+        let expected = Capture::Dump(emulated.dump(content)?);
+        let got = Capture::Dump(machine.dump(content)?);
+        let what = "expected the emulated VGA's bytes, got QEMU's";
+        self.compare(golden, what, &expected, &got);
         Ok(())
     }
 
-    /// Compares two subjects and collects a difference under the golden's name.
-    pub fn compare(&mut self, golden: &Golden, what: &str, expected: &Subject, got: &Subject) {
-        let words = match compare(expected, got) {
-            Ok(None) => return,
-            Ok(Some(difference)) => {
-                let words = format!("{what}: {difference}");
-                let evidence = Box::new((expected.clone(), got.clone(), difference));
-                return self.found.push(Finding {
-                    golden: golden.name.clone(),
-                    words,
-                    evidence: Some(evidence),
-                });
-            }
-            Err(error) => format!("{what} cannot be compared: {error:#}"),
-        };
-        self.note(golden, words);
+    /// Compares two captures and collects a difference under the golden's name. `what` says which captures.
+    pub fn compare(&mut self, golden: &Golden, what: &str, expected: &Capture, got: &Capture) {
+        match compare(expected, got) {
+            Ok(None) => {}
+            Ok(Some(difference)) => self.found.push(Finding {
+                golden: golden.name.clone(),
+                description: format!("{what}: {difference}"),
+                evidence: Some(Box::new((expected.clone(), got.clone(), difference))),
+            }),
+            Err(error) => self.note(golden, format!("{what}: cannot be compared: {error:#}")),
+        }
     }
 
-    fn note(&mut self, golden: &Golden, words: String) {
+    fn note(&mut self, golden: &Golden, description: String) {
         self.found.push(Finding {
             golden: golden.name.clone(),
-            words,
+            description,
             evidence: None,
         });
     }
@@ -370,18 +374,18 @@ impl Findings {
         if self.found.is_empty() {
             return Ok(());
         }
-        let mut words = String::new();
+        let mut list = String::new();
         for finding in &self.found {
-            words += &format!("\n  {finding}");
+            list += &format!("\n  {finding}");
         }
         if self.found.iter().any(|finding| finding.evidence.is_some()) {
-            words += &match self.report(report) {
+            list += &match self.report(report) {
                 Ok(()) => format!("\nreport: {}", report.display()),
                 // If the report cannot be written, the faults must still be listed.
-                Err(error) => format!("\nno report could be written: {error:#}"),
+                Err(error) => format!("\nthe report cannot be written: {error:#}"),
             };
         }
-        bail!("{} found wrong:{words}", self.found.len());
+        bail!("faults in golden frames: {}{list}", self.found.len());
     }
 
     /// Writes an HTML report of the faults that images can show. The folder of `html` belongs to the report:
@@ -400,24 +404,28 @@ impl Findings {
             // Files of an earlier report would only confuse the reader.
             let _ = std::fs::remove_dir_all(folder);
             std::fs::create_dir_all(folder)
-                .with_context(|| format!("{} cannot be made", folder.display()))?;
+                .with_context(|| format!("{}: the folder cannot be created", folder.display()))?;
         }
         report.write(html)
     }
 }
 
 /// Describes how two screens differ; `None` if they are equal.
-fn difference(expected: &Screen, got: &Screen) -> Option<String> {
-    let size = |screen: &Screen| (screen.width, screen.height);
+fn difference(expected: &RgbImage, got: &RgbImage) -> Option<String> {
+    let size = |screen: &RgbImage| (screen.width, screen.height);
     if size(expected) != size(got) {
-        return Some(format!("{:?} dots and {:?}", size(got), size(expected)));
+        let ((width, height), (got_width, got_height)) = (size(expected), size(got));
+        return Some(format!(
+            "expected {width} x {height} dots, got {got_width} x {got_height}"
+        ));
     }
     let mut pairs = expected.pixels.iter().zip(&got.pixels).enumerate();
     let (i, (expected_dot, got_dot)) = pairs.find(|(_, (a, b))| a != b)?;
     let count = 1 + pairs.filter(|(_, (a, b))| a != b).count();
     let (x, y) = (i % expected.width, i / expected.width);
     Some(format!(
-        "dot {x} of scan line {y} is {got_dot:02x?} and {expected_dot:02x?} (first of {count} of {})",
+        "{count} of {} dots differ, first dot {x} of scan line {y}: expected {expected_dot:02x?}, got \
+         {got_dot:02x?}",
         expected.pixels.len()
     ))
 }
@@ -429,32 +437,33 @@ fn difference(expected: &Screen, got: &Screen) -> Option<String> {
 /// # Errors
 /// A VGA that fails, a difference between QEMU's VGA and the emulated VGA (then no PNG is written), a file
 /// that cannot be written.
-pub fn bless<C: Card>(
+pub fn bless<C: Backend>(
     folder: &Path,
     report: &Path,
     boot: impl FnOnce() -> anyhow::Result<C>,
     leave: impl FnOnce(C) -> anyhow::Result<()>,
     mut say: impl FnMut(&str),
 ) -> anyhow::Result<usize> {
-    let mut memory = card::memory();
-    let mut emulated = Emulated::new(&mut memory)?;
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::new(&mut memory)?;
     let mut changes = Vec::new();
     let mut differ = Findings::default();
     for golden in find(folder)? {
-        emulated.show_as(&golden.look, &golden.show)?;
+        emulated.show_with(&golden.options, &golden.show)?;
         let drawn = emulated.dump(Content::Page)?;
         // A PNG that cannot be read is blessed again, like a missing PNG.
         let before = golden.frame().unwrap_or_default();
         match before {
             Some(before) if before == drawn.frame() => continue,
             Some(before) => {
-                let expected = Subject::Png(before);
-                differ.compare(&golden, "changes", &expected, &Subject::Dump(drawn.clone()));
+                let expected = Capture::Png(before);
+                let what = "expected the golden, got the new frame";
+                differ.compare(&golden, what, &expected, &Capture::Dump(drawn.clone()));
                 if let Some(finding) = differ.found.last() {
                     say(&finding.to_string());
                 }
             }
-            None => say(&format!("{}: is new: {}", golden.name, golden.about)),
+            None => say(&format!("{}: new: {}", golden.name, golden.about)),
         }
         changes.push((golden, drawn.frame()));
     }
@@ -463,11 +472,11 @@ pub fn bless<C: Card>(
     }
     if !differ.found.is_empty() {
         differ.report(report)?;
-        say(&format!("before and after: {}", report.display()));
+        say(&format!("report of the changes: {}", report.display()));
     }
     let mut machine = boot()?;
     let mut disagree = Findings::default();
-    let mut step = Step::counting("asking QEMU", changes.len() as u64);
+    let mut step = Step::counting("comparing with QEMU's VGA", changes.len() as u64);
     for (done, (golden, _)) in (1..).zip(&changes) {
         disagree.check_cards(golden, &mut emulated, &mut machine, Transfer::Bytes)?;
         step.at(done);
@@ -476,7 +485,7 @@ pub fn bless<C: Card>(
     leave(machine)?;
     disagree
         .verdict(&report.with_file_name("disagreement").join("report.html"))
-        .context("QEMU does not agree, so nothing was blessed")?;
+        .context("QEMU's VGA shows other frames, so no golden was changed")?;
     for (golden, frame) in &changes {
         write_atomically(&golden.png, |file| frame.write_png(file))?;
     }

@@ -9,7 +9,7 @@ use vga::widen;
 
 /// A frame whose pixels are indices into its palette.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Indexed {
+pub struct IndexedImage {
     /// Width in pixels.
     pub width: usize,
     /// Height in pixels.
@@ -20,13 +20,13 @@ pub struct Indexed {
     pub pixels: Vec<u8>,
 }
 
-impl fmt::Debug for Indexed {
+impl fmt::Debug for IndexedImage {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "a frame of {} x {}", self.width, self.height)
     }
 }
 
-impl Indexed {
+impl IndexedImage {
     /// Writes an indexed PNG with 8 bits per pixel.
     ///
     /// # Errors
@@ -57,31 +57,40 @@ impl Indexed {
         let (width, height) = (info.width as usize, info.height as usize);
         let (colour, depth) = (info.color_type, info.bit_depth);
         let (png::ColorType::Indexed, png::BitDepth::Eight) = (colour, depth) else {
-            bail!("its pixels are {colour:?} of {depth:?} bits, not indices of eight");
+            bail!(
+                "the PNG has {colour:?} pixels of {} bits; give an indexed PNG of 8 bits, as this \
+                 program writes",
+                depth as u8
+            );
         };
-        let parts = info.palette.as_deref().context("it has no palette")?;
+        let parts = info.palette.as_deref().context("the PNG has no palette")?;
         let (colours, rest) = parts.as_chunks::<3>();
         if !rest.is_empty() {
             bail!(
-                "its palette has {} bytes, not three for each colour",
+                "the PNG's palette has {} bytes, which is not a multiple of 3",
                 parts.len()
             );
         }
         let mut palette = Vec::new();
         for (entry, colour) in colours.iter().enumerate() {
             if let Some(part) = colour.iter().find(|&&part| widen(part >> 2) != part) {
-                bail!("palette entry {entry:02x} has a part {part:02x}, which no 6 bits make");
+                bail!(
+                    "palette entry {entry:02x} has the component {part:02x}, which a VGA cannot show; a \
+                     component is a 6-bit value, widened to 8 bits"
+                );
             }
             palette.push(colour.map(|part| part >> 2));
         }
-        let size = reader.output_buffer_size().context("it is too large")?;
+        let size = reader
+            .output_buffer_size()
+            .context("the PNG is too large")?;
         let mut pixels = vec![0; size];
         reader.next_frame(&mut pixels)?;
         // A file that is cut short can contain all pixels and lack the end.
         reader.finish()?;
         if let Some(at) = pixels.iter().position(|&p| usize::from(p) >= palette.len()) {
             bail!(
-                "x {}, y {} has index {:02x}; the palette has {} colours",
+                "the pixel at x {}, y {} has the index {:02x}; the palette has {} colours",
                 at % width,
                 at / width,
                 pixels[at],

@@ -16,17 +16,17 @@ use clap::builder::RangedU64ValueParser;
 use gif::{DisposalMethod, Encoder, Frame, Repeat};
 use protocol::{Command, Content, FrameName, TICKS_PER_SECOND};
 
-use crate::card::{Card, Emulated};
-use crate::indexed::Indexed;
-use crate::look::Look;
+use crate::backend::{Backend, EmulatedDemo};
+use crate::indexed::IndexedImage;
+use crate::options::FrameOptions;
 use crate::write::range;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
-/// Which frames to record, and where to.
+/// The options of `record`: the frames, and the file or folder.
 #[derive(Args, Clone, Debug)]
-pub struct Options {
+pub struct RecordOptions {
     /// Frames A up to B, excluding B (A..=B includes B); the ball turns once in 720 frames
     #[arg(long, value_name = "A..B", value_parser = range, default_value = "0..720")]
     frames: RangeInclusive<u32>,
@@ -43,16 +43,16 @@ pub struct Options {
 /// second.
 const SHORTEST: u64 = 2;
 
-impl Options {
+impl RecordOptions {
     /// Checks the options before anything is set up.
     ///
     /// # Errors
-    /// What is wrong with the options.
+    /// A file of another type than GIF, and frames that follow too fast for a GIF.
     pub fn check(&self) -> anyhow::Result<()> {
         match self.is_gif()? {
             true if centiseconds(self.every.into()) < SHORTEST => bail!(
-                "--every {}: a GIF shows each frame for at least {SHORTEST}/100 s, which is the time \
-                 of two; record a folder of PNGs, or every second frame",
+                "--every {}: too fast for a GIF, which shows each frame for at least {SHORTEST}/100 s; \
+                 give --every 2 or more, or record a folder of PNGs",
                 self.every
             ),
             _ => Ok(()),
@@ -60,43 +60,43 @@ impl Options {
     }
 
     fn is_gif(&self) -> anyhow::Result<bool> {
-        let ending = self
+        let extension = self
             .out
             .extension()
-            .map(|ending| ending.to_ascii_lowercase());
-        match ending {
-            Some(ending) if ending == "gif" => Ok(true),
-            Some(ending) if !self.out.is_dir() => bail!(
-                "{}: a recording is a GIF or a folder of PNGs, and no .{}",
+            .map(|extension| extension.to_ascii_lowercase());
+        match extension {
+            Some(extension) if extension == "gif" => Ok(true),
+            Some(extension) if !self.out.is_dir() => bail!(
+                "--out {}: cannot record a .{}; give a name that ends in .gif, or a folder",
                 self.out.display(),
-                ending.display()
+                extension.display()
             ),
             _ => Ok(false),
         }
     }
 
-    /// Records the frames of `machine`, drawn with the options in `look`; `emulated` draws the same frames
-    /// for comparison. `wrote` receives each file's path.
+    /// Records the frames of `machine`, drawn with `options`; `emulated` draws the same frames for
+    /// comparison. `wrote` receives each file's path.
     ///
     /// # Errors
     /// A VGA fails or a file cannot be written. The GIF, and each PNG, is either complete or missing.
     pub fn record(
         &self,
-        machine: &mut impl Card,
-        emulated: &mut Emulated<'_>,
-        look: &Look,
+        machine: &mut impl Backend,
+        emulated: &mut EmulatedDemo<'_>,
+        options: &FrameOptions,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
     ) -> anyhow::Result<()> {
         let numbers = self.frames.clone().step_by(self.every as usize);
         let what = format_args!("recording into {}", self.out.display());
         let mut step = Step::counting(what, numbers.clone().count() as u64);
-        machine.show_as(look, &[])?;
-        emulated.show_as(look, &[])?;
+        machine.show_with(options, &[])?;
+        emulated.show_with(options, &[])?;
         let mut frames = (1..).zip(numbers).map(|(done, number)| {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            let frame = seen(machine, emulated, FrameName::Number(number))?;
+            let frame = captured(machine, emulated, FrameName::Number(number))?;
             step.at(done);
             Ok((number, frame))
         });
@@ -105,7 +105,7 @@ impl Options {
             return Ok(wrote(&self.out)?);
         }
         std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("{} cannot be made", self.out.display()))?;
+            .with_context(|| format!("{}: the folder cannot be created", self.out.display()))?;
         frames.try_for_each(|recorded| {
             let (number, frame) = recorded?;
             let png = self.out.join(format!("frame-{number:06}.png"));
@@ -117,7 +117,7 @@ impl Options {
     fn write_gif(
         &self,
         file: &mut File,
-        frames: impl Iterator<Item = anyhow::Result<(u32, Indexed)>>,
+        frames: impl Iterator<Item = anyhow::Result<(u32, IndexedImage)>>,
     ) -> anyhow::Result<()> {
         let mut to = BufWriter::new(file);
         let mut frames = frames.peekable();
@@ -149,15 +149,15 @@ fn centiseconds(ticks: u64) -> u64 {
 }
 
 /// Shows `frame` on both VGAs, and returns the frame that QEMU's VGA holds.
-fn seen(
-    machine: &mut impl Card,
-    emulated: &mut Emulated<'_>,
+fn captured(
+    machine: &mut impl Backend,
+    emulated: &mut EmulatedDemo<'_>,
     frame: FrameName,
-) -> anyhow::Result<Indexed> {
-    emulated.ask(Command::Show(frame))?;
-    machine.ask(Command::Show(frame))?;
+) -> anyhow::Result<IndexedImage> {
+    emulated.send(Command::Show(frame))?;
+    machine.send(Command::Show(frame))?;
     let dump = emulated.dump(Content::Page)?;
-    let sums = machine.ask(Command::Checksums(Content::Page))?;
+    let sums = machine.send(Command::Checksums(Content::Page))?;
     Ok(match sums == dump.checksums() {
         true => dump.frame(),
         false => machine.dump(Content::Page)?.frame(),
@@ -165,7 +165,7 @@ fn seen(
 }
 
 /// Returns an encoder for a GIF that has the size and the palette of `frame` and repeats for ever.
-fn encoder<W: Write>(to: W, frame: &Indexed) -> anyhow::Result<Encoder<W>> {
+fn encoder<W: Write>(to: W, frame: &IndexedImage) -> anyhow::Result<Encoder<W>> {
     let colours: Vec<u8> = frame
         .palette
         .iter()
@@ -180,7 +180,7 @@ fn encoder<W: Write>(to: W, frame: &Indexed) -> anyhow::Result<Encoder<W>> {
 
 /// Returns the GIF frame for the rectangle in which `now` differs from `before`. Equal pixels in the
 /// rectangle are transparent if a palette index is left for that.
-fn changed(before: Option<&Indexed>, now: &Indexed) -> anyhow::Result<Frame<'static>> {
+fn changed(before: Option<&IndexedImage>, now: &IndexedImage) -> anyhow::Result<Frame<'static>> {
     let width = now.width;
     let differs = |i: usize| before.is_none_or(|before| before.pixels[i] != now.pixels[i]);
     let places = (0..now.pixels.len()).filter(|&i| differs(i));
@@ -219,8 +219,8 @@ fn changed(before: Option<&Indexed>, now: &Indexed) -> anyhow::Result<Frame<'sta
 mod tests {
     use super::*;
 
-    fn options(every: u32, out: &str) -> Options {
-        Options {
+    fn options(every: u32, out: &str) -> RecordOptions {
+        RecordOptions {
             frames: 0..=1,
             every,
             out: out.into(),
@@ -228,17 +228,13 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_recording_is_told_before_anything_is_set_up() {
+    fn an_impossible_recording_is_refused_before_anything_is_set_up() {
         for (every, out) in [(2, "a.gif"), (600, "A.GIF"), (1, "folder"), (1, "/tmp")] {
             options(every, out).check().unwrap();
         }
         for (every, out, why) in [
-            (1, "a.gif", "--every 1: a GIF shows each frame for"),
-            (
-                3,
-                "a.mp4",
-                "a.mp4: a recording is a GIF or a folder of PNGs, and no .mp4",
-            ),
+            (1, "a.gif", "--every 1: too fast for a GIF"),
+            (3, "a.mp4", "--out a.mp4: cannot record a .mp4"),
         ] {
             let error = options(every, out).check().unwrap_err().to_string();
             assert!(error.starts_with(why), "{error}");
@@ -246,10 +242,10 @@ mod tests {
     }
 
     #[test]
-    fn a_gif_is_the_frames_and_lasts_as_long() {
+    fn a_gif_shows_every_frame_and_has_their_total_time() {
         let mut random = seeded::generator();
         let palette: Vec<_> = (0..=255u8).map(|i| [i / 4, i % 64, i / 8]).collect();
-        let mut frame = Indexed {
+        let mut frame = IndexedImage {
             width: 20,
             height: 14,
             palette,

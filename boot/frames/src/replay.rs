@@ -13,16 +13,16 @@ use console::Term;
 use scene::font;
 
 use crate::comparison::list;
-use crate::difference::Subject;
-use crate::indexed::Indexed;
-use crate::screen::Screen;
+use crate::difference::Capture;
+use crate::indexed::IndexedImage;
+use crate::rgb::RgbImage;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
-/// Which frames to show, and how.
+/// The options of `replay`: the frames, and how to show them.
 #[derive(Args, Clone, Debug)]
-pub struct Options {
+pub struct ReplayOptions {
     /// Dumps, indexed PNGs, or folders of them; if a folder has a dump and a PNG of the same name, the dump
     /// is shown
     #[arg(required = true)]
@@ -51,7 +51,7 @@ const LINE: usize = font::HEIGHT + 3;
 /// twice the font's size, and 26 letters fit.
 const PER_SCALE: usize = 160;
 
-impl Options {
+impl ReplayOptions {
     /// Plays the frames, or writes the sheet and passes its path to `wrote`.
     ///
     /// # Errors
@@ -59,7 +59,9 @@ impl Options {
     /// terminal, or cannot be written.
     pub fn run(&self, wrote: impl FnOnce(&Path) -> std::io::Result<()>) -> anyhow::Result<()> {
         if self.sheet.is_none() && !stdout().is_terminal() {
-            bail!("standard output is no terminal to play in; --sheet FILE.png makes a sheet");
+            bail!(
+                "standard output is not a terminal; give --sheet FILE.png to write a contact sheet"
+            );
         }
         let files = self.files()?;
         let mut frames = Vec::new();
@@ -68,7 +70,7 @@ impl Options {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            frames.push(Subject::read(file)?.frame().into_owned());
+            frames.push(Capture::read(file)?.frame().into_owned());
             step.at(done);
         }
         drop(step);
@@ -92,7 +94,8 @@ impl Options {
                 files.push(path.clone());
                 continue;
             }
-            let names = list(path).with_context(|| format!("{} cannot be read", path.display()))?;
+            let names =
+                list(path).with_context(|| format!("{}: cannot be read", path.display()))?;
             let frames = names.iter().map(|name| path.join(name));
             // A dump and a PNG of the same name are the same frame.
             files.extend(frames.filter(|file| {
@@ -101,13 +104,13 @@ impl Options {
             }));
         }
         if files.is_empty() {
-            bail!("there is no dump and no PNG in what was named");
+            bail!("no .dump or .png file to show; give files, or folders that contain some");
         }
         Ok(files)
     }
 
-    fn play(&self, frames: &[Indexed]) -> anyhow::Result<()> {
-        let screen = Alternate::enter()?;
+    fn play(&self, frames: &[IndexedImage]) -> anyhow::Result<()> {
+        let screen = AlternateScreen::enter()?;
         let time = Duration::from_secs(1) / self.rate;
         let mut due = Instant::now();
         loop {
@@ -115,7 +118,10 @@ impl Options {
                 let (rows, columns) = Term::stdout().size();
                 let mut text = in_blocks(frame, columns.into(), rows.saturating_sub(1).into());
                 let count = frames.len();
-                let _ = write!(text, "{RESET}{ERASE}{i} of {count}; Ctrl-C ends it");
+                let _ = write!(
+                    text,
+                    "{RESET}{ERASE}frame {i} of {count}; press Ctrl-C to stop"
+                );
                 screen.write(&text)?;
                 due += time;
                 while Instant::now() < due {
@@ -135,9 +141,9 @@ const RESET: &str = "\x1b[0m";
 const ERASE: &str = "\x1b[J";
 
 /// The terminal's alternate screen. Dropping it restores the terminal's contents.
-struct Alternate;
+struct AlternateScreen;
 
-impl Alternate {
+impl AlternateScreen {
     fn enter() -> anyhow::Result<Self> {
         let this = Self;
         this.write("\x1b[?1049h\x1b[?25l\x1b[2J")?;
@@ -147,11 +153,11 @@ impl Alternate {
     fn write(&self, text: &str) -> anyhow::Result<()> {
         let mut out = stdout().lock();
         let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-        written.context("the terminal cannot be written")
+        written.context("cannot write to the terminal")
     }
 }
 
-impl Drop for Alternate {
+impl Drop for AlternateScreen {
     fn drop(&mut self) {
         // If the terminal is gone, there is nothing to restore.
         let _ = self.write("\x1b[?25h\x1b[?1049l");
@@ -159,12 +165,12 @@ impl Drop for Alternate {
 }
 
 /// Returns a pixel's colour, 8 bits per component.
-fn colour(frame: &Indexed, x: usize, y: usize) -> [u8; 3] {
+fn colour(frame: &IndexedImage, x: usize, y: usize) -> [u8; 3] {
     frame.palette[usize::from(frame.pixels[y * frame.width + x])].map(widen)
 }
 
 /// Shrinks a frame to `width` x `height`. Each pixel is the mean of the pixels that it replaces.
-fn shrunk(frame: &Indexed, width: usize, height: usize) -> Screen {
+fn shrunk(frame: &IndexedImage, width: usize, height: usize) -> RgbImage {
     let mut pixels = Vec::with_capacity(width * height);
     for j in 0..height {
         for i in 0..width {
@@ -185,7 +191,7 @@ fn shrunk(frame: &Indexed, width: usize, height: usize) -> Screen {
             pixels.push(sum.map(|sum| ((sum + count / 2) / count) as u8));
         }
     }
-    Screen {
+    RgbImage {
         width,
         height,
         pixels,
@@ -193,7 +199,7 @@ fn shrunk(frame: &Indexed, width: usize, height: usize) -> Screen {
 }
 
 /// Returns a frame as half-block characters, two pixels each, as large as fits.
-fn in_blocks(frame: &Indexed, columns: usize, rows: usize) -> String {
+fn in_blocks(frame: &IndexedImage, columns: usize, rows: usize) -> String {
     let (columns, rows) = (columns.max(1), rows.max(1));
     // A terminal's character is about twice as high as wide, so its two halves are about square.
     let width = columns
@@ -250,7 +256,7 @@ fn cut(name: &str, letters: usize) -> String {
 }
 
 /// Writes text on a sheet. The text must lie completely on the sheet.
-fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) {
+fn write(sheet: &mut RgbImage, text: &str, left: usize, top: usize, scale: usize) {
     for (i, letter) in text.chars().enumerate() {
         let rows = font::glyph(letter);
         for (y, x) in (0..font::HEIGHT * scale)
@@ -263,9 +269,9 @@ fn write(sheet: &mut Screen, text: &str, left: usize, top: usize, scale: usize) 
 }
 
 /// Returns a sheet of all frames, row by row, with their names below.
-fn lay_out(frames: &[Indexed], names: &[String]) -> Screen {
+fn lay_out(frames: &[IndexedImage], names: &[String]) -> RgbImage {
     let across = (1..).find(|n| n * n >= frames.len()).unwrap_or(1);
-    let most = |of: fn(&Indexed) -> usize| frames.iter().map(of).max().unwrap_or(1);
+    let most = |of: fn(&IndexedImage) -> usize| frames.iter().map(of).max().unwrap_or(1);
     let (wide, high) = (most(|p| p.width), most(|p| p.height));
     // Full size, if it fits.
     let cell_width = wide.min((SHEET_WIDTH / across).saturating_sub(GAP)).max(1);
@@ -273,7 +279,7 @@ fn lay_out(frames: &[Indexed], names: &[String]) -> Screen {
     let down = frames.len().div_ceil(across);
     let scale = (cell_width / PER_SCALE).max(1);
     let pitch = cell_height + LINE * scale + GAP;
-    let mut sheet = Screen {
+    let mut sheet = RgbImage {
         width: GAP + across * (cell_width + GAP),
         height: GAP + down * pitch,
         pixels: Vec::new(),
@@ -300,8 +306,8 @@ mod tests {
     use super::*;
 
     /// Returns a frame whose left half is black and whose right half is white.
-    fn halves(width: usize, height: usize) -> Indexed {
-        Indexed {
+    fn halves(width: usize, height: usize) -> IndexedImage {
+        IndexedImage {
             width,
             height,
             palette: vec![[0; 3], [63; 3]],
@@ -312,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn a_smaller_frame_has_the_mean_of_what_it_leaves_out() {
+    fn each_pixel_of_a_shrunk_frame_is_the_mean_of_the_pixels_it_replaces() {
         let frame = halves(320, 240);
         assert_eq!(shrunk(&frame, 320, 240).pixels[160], [255; 3]);
         let third = shrunk(&frame, 3, 2).pixels;
@@ -321,7 +327,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sheet_has_every_frame_in_its_place() {
+    fn a_sheet_has_every_frame_with_its_name_below() {
         let frames = vec![halves(320, 240); 5];
         let names: Vec<_> = (0..5).map(|i| format!("frame-{i:06}")).collect();
         let sheet = lay_out(&frames, &names);
@@ -346,7 +352,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_loses_its_middle_and_names_of_two_folders_have_theirs() {
+    fn a_long_name_loses_its_middle_and_names_from_two_folders_include_the_folder() {
         for (name, letters, fits) in [
             ("frame-000123", 12, "frame-000123"),
             ("frame-000123", 11, "fram..00123"),
@@ -365,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn blocks_fit_the_terminal() {
+    fn a_frame_in_block_characters_fits_the_terminal() {
         for (columns, rows) in [(80, 24), (400, 100), (10, 200), (1, 1), (0, 0)] {
             let text = in_blocks(&halves(320, 240), columns, rows);
             let lines: Vec<_> = text.lines().collect();

@@ -34,7 +34,7 @@ for (const three of document.querySelectorAll(".three")) {
       text.textContent = place;
       lenses[i].style.left = x < width / 2 ? "auto" : "8px";
       lenses[i].style.right = x < width / 2 ? "8px" : "auto";
-      // Beside the pointer, and not beyond what is seen of a tall picture.
+      // Beside the pointer, and not beyond what is visible of a tall frame.
       const top = (event.clientY - area.top) / area.height * view.clientHeight - 90;
       lenses[i].style.top = `${Math.max(8, Math.min(view.clientHeight - 214, top))}px`;
       view.append(lenses[i]);

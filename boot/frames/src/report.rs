@@ -17,15 +17,16 @@ use anyhow::Context;
 use modex::Rgb6;
 use protocol::Content;
 
-use crate::difference::{Bounds, Colour, Difference, Shape, Subject, colour, differing_entries};
+use crate::difference::{
+    Bounds, Capture, Difference, HexColour, PixelLayout, colour, differing_entries,
+};
 use crate::dump::Dump;
-use crate::indexed::Indexed;
-use crate::screen::Screen;
+use crate::html::{self, escape};
+use crate::indexed::IndexedImage;
+use crate::rgb::RgbImage;
 use system::write_atomically;
 use vga::widen;
 
-/// The style sheet of every page that this project writes.
-pub const STYLE: &str = include_str!("report.css");
 const SCRIPT: &str = include_str!("report.js");
 
 /// The scale at which frames are shown if the window is wide enough.
@@ -52,21 +53,21 @@ const SAME_INDEX: [u8; 3] = [0x8F, 0x7B, 0xFF];
 pub struct Report {
     between: Option<[String; 2]>,
     equal: usize,
-    different: Vec<Pair>,
+    different: Vec<DifferentPair>,
     incomparable: Vec<[String; 2]>,
 }
 
 /// A pair that differs.
 #[derive(Clone, Debug)]
-struct Pair {
+struct DifferentPair {
     name: String,
-    expected: Subject,
-    got: Subject,
+    expected: Capture,
+    got: Capture,
     difference: Difference,
 }
 
 /// A function that writes the contents of a file in the report's folder.
-type Make<'a> = Box<dyn Fn(&mut fs::File) -> anyhow::Result<()> + 'a>;
+type WriteFile<'a> = Box<dyn Fn(&mut fs::File) -> anyhow::Result<()> + 'a>;
 
 impl Report {
     /// Returns an empty report.
@@ -83,8 +84,8 @@ impl Report {
     }
 
     /// Adds a pair that differs.
-    pub fn add(&mut self, name: &str, expected: &Subject, got: &Subject, difference: &Difference) {
-        self.different.push(Pair {
+    pub fn add(&mut self, name: &str, expected: &Capture, got: &Capture, difference: &Difference) {
+        self.different.push(DifferentPair {
             name: name.into(),
             expected: expected.clone(),
             got: got.clone(),
@@ -107,22 +108,22 @@ impl Report {
     /// # Errors
     /// A file that cannot be written.
     pub fn write(&self, html: &Path) -> anyhow::Result<()> {
-        let name = || format!("{} is no name for a report", html.display());
+        let name = || format!("--report {}: not a file name", html.display());
         let mut folder_name = html.file_stem().with_context(name)?.to_owned();
         folder_name.push("-files");
         let folder = html.with_file_name(&folder_name);
         if !self.different.is_empty() && !folder.is_dir() {
-            let context = || format!("the folder {} cannot be made", folder.display());
+            let context = || format!("{}: the folder cannot be created", folder.display());
             fs::create_dir(&folder).with_context(context)?;
         }
         let url = url(&folder_name);
         let mut page = self.head();
-        let mut names = Names::default();
+        let mut names = UniqueNames::default();
         for (i, pair) in self.different.iter().enumerate() {
             let name = names.take(&pair.name);
-            let put = |ending: &str, make: Make| {
-                let path = folder.join(format!("{name}-{ending}"));
-                write_atomically(&path, make)
+            let put = |suffix: &str, write: WriteFile| {
+                let path = folder.join(format!("{name}-{suffix}"));
+                write_atomically(&path, write)
             };
             pair.section(&mut page, i, &format!("{url}/{name}"), &put)?;
         }
@@ -146,25 +147,24 @@ impl Report {
         };
         match self.incomparable.len() {
             0 => title,
-            1 if all == 1 => "It could not be compared".into(),
+            1 if all == 1 => "The pair could not be compared".into(),
             n => format!("{title}, {n} could not be compared"),
         }
     }
 
     /// Returns the start of the page, up to the first pair.
     fn head(&self) -> String {
-        let title = escape(&self.title());
+        let title = self.title();
         let verdict = match (self.different.len(), self.incomparable.len()) {
             (0, 0) => "equal",
             _ => "different",
         };
-        let mut page = format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <title>{title} - Crystal Ball</title>\n<style>\n{STYLE}</style>\n</head>\n\
-             <body id=\"top\">\n<header class=\"top {verdict}\">\n\
-             <p class=\"brand\">Crystal Ball <span>diff</span></p>\n<h1>{title}</h1>\n"
+        let mut page = html::head(&title, "");
+        let _ = write!(
+            page,
+            "<body id=\"top\">\n<header class=\"top {verdict}\">\n\
+             <p class=\"brand\">Crystal Ball <span>diff</span></p>\n<h1>{}</h1>\n",
+            escape(&title)
         );
         if let Some(between) = &self.between {
             let [expected, got] = between.each_ref().map(|path| escape(path));
@@ -236,11 +236,11 @@ impl Report {
 /// The legend of the colours, and the controls for the frames' scale.
 const LEGEND: &str = r#"<aside class="bar">
 <ul class="legend" aria-label="Colours of the difference images">
-<li><i class="ramp"></i>differs: near to far in colour</li>
-<li><i class="same-colour"></i>another index, the same colour</li>
-<li><i class="same-index"></i>the same index, another colour</li>
+<li><i class="ramp"></i>different colour: similar to very different</li>
+<li><i class="same-colour"></i>different index, same colour</li>
+<li><i class="same-index"></i>same index, different colour</li>
 <li><i class="same"></i>equal</li>
-<li><i class="bounds"></i>box around what differs</li>
+<li><i class="bounds"></i>box around the differences</li>
 </ul>
 <div class="controls">
 <span class="scale" role="radiogroup" aria-label="Scale">
@@ -252,29 +252,29 @@ const LEGEND: &str = r#"<aside class="bar">
 "#;
 
 /// A pair of images to show side by side, with their difference.
-struct View {
+struct ImagePair {
     /// Part of the files' names.
     suffix: &'static str,
     title: Option<&'static str>,
-    expected: Indexed,
-    got: Indexed,
-    shape: Shape,
+    expected: IndexedImage,
+    got: IndexedImage,
+    layout: PixelLayout,
 }
 
-impl Pair {
-    fn views(&self) -> Vec<View> {
+impl DifferentPair {
+    fn views(&self) -> Vec<ImagePair> {
         let (expected, got) = (self.expected.frame(), self.got.frame());
-        let page = View {
+        let page = ImagePair {
             suffix: "",
             title: None,
-            shape: Shape {
+            layout: PixelLayout {
                 width: expected.width,
                 memory: None,
             },
             expected: expected.into_owned(),
             got: got.into_owned(),
         };
-        let (Subject::Dump(expected), Subject::Dump(got)) = (&self.expected, &self.got) else {
+        let (Capture::Dump(expected), Capture::Dump(got)) = (&self.expected, &self.got) else {
             return vec![page];
         };
         if expected.header.content != Content::Memory {
@@ -289,17 +289,17 @@ impl Pair {
                 a != b && usize::from(behind) >= length
             })
         };
-        let memory = View {
+        let memory = ImagePair {
             suffix: "-memory",
             title: Some("All of video memory"),
             expected: whole(expected),
             got: whole(got),
-            shape: Shape {
+            layout: PixelLayout {
                 width: expected.header.width.into(),
                 memory: Some(expected.header.height.into()),
             },
         };
-        let page = View {
+        let page = ImagePair {
             title: Some("The page on the screen"),
             ..page
         };
@@ -317,7 +317,7 @@ impl Pair {
         page: &mut String,
         i: usize,
         url: &str,
-        put: &dyn Fn(&str, Make) -> anyhow::Result<()>,
+        put: &dyn Fn(&str, WriteFile) -> anyhow::Result<()>,
     ) -> anyhow::Result<()> {
         let name = escape(&self.name);
         let _ = write!(
@@ -331,7 +331,7 @@ impl Pair {
         *page += "</ul>\n";
         let mut links = Vec::new();
         for view in self.views() {
-            let View {
+            let ImagePair {
                 suffix,
                 expected,
                 got,
@@ -349,7 +349,7 @@ impl Pair {
             links.extend(["expected", "got", "difference"].map(ending));
         }
         for (of, subject) in [("expected", &self.expected), ("got", &self.got)] {
-            if let Subject::Dump(dump) = subject {
+            if let Capture::Dump(dump) = subject {
                 let ending = format!("{of}.dump");
                 put(&ending, Box::new(|to| Ok(dump.write(to)?)))?;
                 links.push(ending);
@@ -371,30 +371,30 @@ impl Pair {
             return;
         };
         let (expected, got);
-        let (shape, a, b) = match (&self.expected, &self.got) {
-            (Subject::Dump(a), Subject::Dump(b)) => {
+        let (layout, a, b) = match (&self.expected, &self.got) {
+            (Capture::Dump(a), Capture::Dump(b)) => {
                 let height = usize::from(a.header.height);
                 let memory = (a.header.content == Content::Memory).then_some(height);
                 let width = a.header.width.into();
-                (Shape { width, memory }, &a.pixels[..], &b.pixels[..])
+                (PixelLayout { width, memory }, &a.pixels[..], &b.pixels[..])
             }
             (a, b) => {
                 (expected, got) = (a.frame(), b.frame());
                 let width = expected.width;
-                let shape = Shape {
+                let layout = PixelLayout {
                     width,
                     memory: None,
                 };
-                (shape, &expected.pixels[..], &got.pixels[..])
+                (layout, &expected.pixels[..], &got.pixels[..])
             }
         };
         let count = pixels.count;
         let summary = match count {
-            1 => "Its values".into(),
-            ..=LISTED => format!("The values of all {count}"),
-            _ => format!("The values of the first {LISTED}"),
+            1 => "Value of the pixel".into(),
+            ..=LISTED => format!("Values of all {count} pixels"),
+            _ => format!("Values of the first {LISTED} pixels"),
         };
-        let at = match shape.memory {
+        let at = match layout.memory {
             Some(_) => "<th>address</th><th>page</th>",
             None => "",
         };
@@ -406,7 +406,7 @@ impl Pair {
         let palettes = [palette(&self.expected), palette(&self.got)];
         let differing = a.iter().zip(b).enumerate().filter(|(_, (a, b))| a != b);
         for (i, (&a, &b)) in differing.take(LISTED) {
-            let place = shape.place(i);
+            let place = layout.place(i);
             let (mut x, mut y) = (place.x.to_string(), place.y.to_string());
             let _ = write!(page, "<tr><td>{}</td>", place.plane);
             if let Some(at) = place.memory {
@@ -434,8 +434,8 @@ impl Pair {
             return;
         };
         let entries = match colours.count {
-            1 => "The palette's entry that differs".into(),
-            n => format!("The palette's {n} entries that differ"),
+            1 => "Palette entry that differs".into(),
+            n => format!("{n} palette entries that differ"),
         };
         let _ = write!(
             page,
@@ -455,14 +455,14 @@ impl Pair {
     }
 }
 
-impl View {
+impl ImagePair {
     /// Adds the three images, side by side.
     fn figures(&self, page: &mut String, name: &str, url: &str) {
         let (width, height) = (self.expected.width.max(1), self.expected.height.max(1));
         if let Some(title) = self.title {
             let _ = writeln!(page, "<h3>{title}</h3>");
         }
-        let memory = self.shape.memory;
+        let memory = self.layout.memory;
         let scale = SCALE.max(WIDTH / width);
         let kind = if memory.is_some() { " memory" } else { "" };
         let bounds = self.bounds();
@@ -507,8 +507,8 @@ impl View {
     /// Returns a bounding box of the differences for each page that has any, as HTML.
     fn bounds(&self) -> String {
         let (width, height) = (self.expected.width, self.expected.height);
-        let lines = self.shape.memory.unwrap_or(height);
-        let shape = Shape {
+        let lines = self.layout.memory.unwrap_or(height);
+        let layout = PixelLayout {
             width,
             memory: None,
         };
@@ -516,7 +516,7 @@ impl View {
         let [expected, got] = pages;
         let pairs = expected.zip(got).enumerate();
         let boxes = pairs.filter_map(|(page, (expected, got))| {
-            let Bounds { x0, x1, y0, y1 } = shape.compare(expected, got)?.bounds;
+            let Bounds { x0, x1, y0, y1 } = layout.compare(expected, got)?.bounds;
             let above = page * lines;
             let moved = Bounds {
                 x0,
@@ -544,12 +544,12 @@ fn bounds(bounds: &Bounds, width: usize, height: usize) -> String {
 }
 
 /// Returns all of video memory as an image whose lines are the dump's lines.
-fn whole(dump: &Dump) -> Indexed {
+fn whole(dump: &Dump) -> IndexedImage {
     let width = usize::from(dump.header.width);
     let height = dump.pixels.len().div_ceil(width);
     let mut pixels = dump.pixels.clone();
     pixels.resize(width * height, 0);
-    Indexed {
+    IndexedImage {
         width,
         height,
         palette: dump.palette.to_vec(),
@@ -557,16 +557,16 @@ fn whole(dump: &Dump) -> Indexed {
     }
 }
 
-fn palette(subject: &Subject) -> &[Rgb6] {
+fn palette(subject: &Capture) -> &[Rgb6] {
     match subject {
-        Subject::Dump(dump) => &dump.palette,
-        Subject::Png(frame) => &frame.palette,
+        Capture::Dump(dump) => &dump.palette,
+        Capture::Png(frame) => &frame.palette,
     }
 }
 
 /// Returns the expected frame in dim grey, with the differing pixels in bright colours.
-fn difference(expected: &Indexed, got: &Indexed) -> Screen {
-    let colour = |frame: &Indexed, index: u8| {
+fn difference(expected: &IndexedImage, got: &IndexedImage) -> RgbImage {
+    let colour = |frame: &IndexedImage, index: u8| {
         let colour = frame.palette.get(usize::from(index));
         colour.copied().unwrap_or_default()
     };
@@ -580,7 +580,7 @@ fn difference(expected: &Indexed, got: &Indexed) -> Screen {
             (false, false) => between_near_and_far(from, to),
         }
     });
-    Screen {
+    RgbImage {
         width: expected.width,
         height: expected.height,
         pixels: pixels.collect(),
@@ -608,7 +608,7 @@ struct Swatch(Option<Rgb6>);
 impl fmt::Display for Swatch {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(parts) = self.0 {
-            let shown = Colour(parts.map(widen));
+            let shown = HexColour(parts.map(widen));
             write!(f, "<i style=\"background:#{shown}\"></i>")?;
         }
         write!(f, "<code>{}</code>", colour(self.0))
@@ -617,9 +617,9 @@ impl fmt::Display for Swatch {
 
 /// File names that are unique on any file system, even one that ignores case.
 #[derive(Default)]
-struct Names(HashSet<String>);
+struct UniqueNames(HashSet<String>);
 
-impl Names {
+impl UniqueNames {
     fn take(&mut self, name: &str) -> String {
         let mut plain = String::new();
         for c in name.chars().take(MAX_NAME) {
@@ -646,25 +646,9 @@ impl Names {
 
 fn percent(count: usize, of: usize) -> String {
     match 100.0 * count as f64 / of as f64 {
-        share if share < 0.01 => "&lt; 0.01 %".into(),
+        share if share < 0.01 => escape("< 0.01 %"),
         share => format!("{share:.2} %"),
     }
-}
-
-/// Escapes text for HTML, including an attribute's quotes.
-fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => escaped += "&amp;",
-            '<' => escaped += "&lt;",
-            '>' => escaped += "&gt;",
-            '"' => escaped += "&quot;",
-            '\'' => escaped += "&#39;",
-            c => escaped.push(c),
-        }
-    }
-    escaped
 }
 
 /// Returns a file name as part of a relative URL.
@@ -686,9 +670,10 @@ fn url(name: &OsStr) -> String {
 mod tests {
     use super::*;
     use crate::difference::compare;
+    use crate::html::STYLE;
 
-    fn frame(pixels: &[u8]) -> Indexed {
-        Indexed {
+    fn frame(pixels: &[u8]) -> IndexedImage {
+        IndexedImage {
             width: 4,
             height: pixels.len() / 4,
             palette: vec![[0; 3], [63; 3], [63; 3], [0, 0, 1]],
@@ -697,10 +682,10 @@ mod tests {
     }
 
     #[test]
-    fn the_difference_shows_how_far_the_colours_are() {
+    fn the_difference_image_shows_how_much_colours_differ() {
         let expected = frame(&[0, 0, 1, 1]);
         let mut got = frame(&[1, 3, 2, 1]);
-        let pixels = |got: &Indexed| difference(&expected, got).pixels;
+        let pixels = |got: &IndexedImage| difference(&expected, got).pixels;
         let [far, near, same, equal] = pixels(&got)[..] else {
             panic!()
         };
@@ -713,7 +698,7 @@ mod tests {
     }
 
     #[test]
-    fn the_legend_has_the_images_colours() {
+    fn the_legend_has_the_colours_of_the_difference_image() {
         for (name, [red, green, blue]) in [
             ("near", NEAR),
             ("far", FAR),
@@ -726,11 +711,11 @@ mod tests {
     }
 
     #[test]
-    fn names_are_harmless_wherever_they_stand() {
+    fn names_are_escaped_in_the_page_and_in_file_names() {
         let folder = tempfile::tempdir().unwrap();
         let html = folder.path().join("a b%#é.html");
         let (expected, got) = (frame(&[0; 8]), frame(&[1; 8]));
-        let [expected, got] = [expected, got].map(Subject::Png);
+        let [expected, got] = [expected, got].map(Capture::Png);
         let difference = compare(&expected, &got).unwrap().unwrap();
         let mut report = Report::new();
         for name in ["../<b>&\"'/x", "../<B>&\"'/x", "", &"long ".repeat(99)] {
@@ -759,7 +744,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_fetched_from_elsewhere() {
+    fn a_report_loads_nothing_from_the_network() {
         for text in [STYLE, SCRIPT, LEGEND] {
             assert!(!text.contains("//") || text == SCRIPT && !text.contains("://"));
             assert!(!text.contains("@import"));

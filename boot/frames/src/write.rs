@@ -10,18 +10,18 @@ use anyhow::Context;
 use clap::{ArgAction, Args};
 use protocol::{Command, Content, FrameName, Motion};
 
-use crate::card::Card;
-use crate::look::Look;
+use crate::backend::Backend;
+use crate::options::FrameOptions;
 use system::Step;
 use system::{Interrupted, interrupted, write_atomically};
 
-/// Which frames to write, how much of video memory, and where to.
+/// The options of `dump` and `emulate`: the frames, how much of video memory, and the folder.
 #[derive(Args, Clone, Debug)]
-pub struct Frames {
+pub struct DumpOptions {
     #[command(flatten)]
-    which: Which,
-    /// Draw in reduced quality, as for a solid that moves this much in one tick: the changes of the three
-    /// angles and of the distance, in hex and modulo 2^32, as on the line `motion` of a dump
+    which: FrameSelection,
+    /// Draw in reduced quality, as for a solid that moves this much in one tick: the changes of yaw, pitch,
+    /// roll and distance, in hex and modulo 2^32, as on the line `motion` of a dump
     #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
         value_parser = hex, action = ArgAction::Set)]
     motion: Option<Vec<u32>>,
@@ -35,15 +35,15 @@ pub struct Frames {
 
 #[derive(Args, Clone, Debug)]
 #[group(required = true, multiple = true)]
-struct Which {
-    /// The frame with this number; can be repeated
+struct FrameSelection {
+    /// The frame with this number; give the option again for more frames
     #[arg(long = "frame", value_name = "N")]
     single: Vec<u32>,
     /// Frames A up to B, excluding B (A..=B includes B)
     #[arg(long = "frames", value_name = "A..B", value_parser = range)]
     ranges: Vec<RangeInclusive<u32>>,
-    /// The solid in this pose: yaw, pitch and roll as 32-bit fractions of a turn and the distance in 16.16
-    /// fixed point, in hex, as in the descriptions in tests/golden
+    /// The solid in this pose: yaw, pitch and roll as 32-bit fractions of a turn (40000000 is a quarter), and
+    /// the distance in 16.16 fixed point (50000 is 5 units), all in hex
     #[arg(long, num_args = 4, value_names = ["YAW", "PITCH", "ROLL", "DISTANCE"],
         value_parser = hex)]
     pose: Vec<u32>,
@@ -53,7 +53,7 @@ struct Which {
 fn hex(text: &str) -> Result<u32, String> {
     // `from_str_radix` would accept a plus sign.
     if !text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
-        return Err("a hex number has the digits 0 to 9 and a to f".into());
+        return Err("not a hex number; its digits are 0 to 9 and a to f".into());
     }
     u32::from_str_radix(text, 16).map_err(|error| error.to_string())
 }
@@ -61,10 +61,10 @@ fn hex(text: &str) -> Result<u32, String> {
 /// Parses `A..B` or `A..=B`.
 pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
     let parts = text.split_once("..");
-    let (first, last) = parts.ok_or("two frame numbers are written A..B, or A..=B")?;
+    let (first, last) = parts.ok_or("not a range; give two frame numbers as A..B or A..=B")?;
     let number = |text: &str| {
         let number = text.parse::<u32>();
-        number.map_err(|error| format!("'{text}' is no frame number: {error}"))
+        number.map_err(|error| format!("'{text}' is not a frame number: {error}"))
     };
     let first = number(first)?;
     let last = match last.strip_prefix('=') {
@@ -73,13 +73,13 @@ pub(crate) fn range(text: &str) -> Result<RangeInclusive<u32>, String> {
     };
     last.map(|last| first..=last)
         .filter(|range| !range.is_empty())
-        .ok_or_else(|| "there is no frame in it".into())
+        .ok_or_else(|| "the range has no frame; A..B excludes B, A..=B includes B".into())
 }
 
-impl Frames {
+impl DumpOptions {
     /// Returns the number of frames, and the frames.
     fn frames(&self) -> (u64, impl Iterator<Item = FrameName>) {
-        let Which {
+        let FrameSelection {
             single,
             ranges,
             pose,
@@ -117,19 +117,19 @@ impl Frames {
         })
     }
 
-    /// Shows each frame on `card`, drawn with the options in `look`, and writes its dump and its PNG. `wrote`
-    /// receives the path of each file.
+    /// Shows each frame on a VGA, drawn with `options`, and writes its dump and its PNG. `wrote` receives the
+    /// path of each file.
     ///
     /// # Errors
     /// The VGA fails or a file cannot be written; the files written before are complete.
     pub fn write(
         &self,
-        card: &mut impl Card,
-        look: &Look,
+        backend: &mut impl Backend,
+        options: &FrameOptions,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
     ) -> anyhow::Result<()> {
         std::fs::create_dir_all(&self.out)
-            .with_context(|| format!("{} cannot be made", self.out.display()))?;
+            .with_context(|| format!("{}: the folder cannot be created", self.out.display()))?;
         let content = match self.all {
             true => Content::Memory,
             false => Content::Page,
@@ -142,12 +142,12 @@ impl Frames {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            card.show_as(look, &[])?;
-            card.ask(match motion {
+            backend.show_with(options, &[])?;
+            backend.send(match motion {
                 Some(motion) => Command::ShowMoving(frame, motion),
                 None => Command::Show(frame),
             })?;
-            let dump = card.dump(content)?;
+            let dump = backend.dump(content)?;
             let stem = self.out.join(stem(frame, motion, content));
             let text = stem.with_added_extension("dump");
             write_atomically(&text, |file| Ok(dump.write(std::io::BufWriter::new(file))?))?;
@@ -188,19 +188,18 @@ mod tests {
     use texmap::Mapper;
 
     use super::*;
-    use crate::card::{self, Emulated};
+    use crate::backend::{self, EmulatedDemo};
     use crate::dump::Dump;
-    use crate::look::Named;
 
     /// Takes the motion of a frame in reduced quality from its header, and draws the same bytes again.
     #[test]
     fn a_frame_of_reduced_quality_is_drawn_again_from_its_header() {
-        let mut memory = card::memory();
-        let mut card = Emulated::new(&mut memory).unwrap();
+        let mut memory = backend::memory();
+        let mut demo = EmulatedDemo::new(&mut memory).unwrap();
         for line in ["scene cube", "mapper exact", "steer 5 quality", "show at 9"] {
-            card.ask(Command::parse(line).unwrap()).unwrap();
+            demo.send(Command::parse(line).unwrap()).unwrap();
         }
-        let shown = card.dump(Content::Page).unwrap();
+        let shown = demo.dump(Content::Page).unwrap();
         assert_eq!(shown.header.frame, Some(FrameName::Number(9)));
         let motion = shown.header.motion.expect("it is in reduced quality");
         let Motion {
@@ -210,8 +209,8 @@ mod tests {
             distance,
         } = motion;
         let folder = tempfile::tempdir().unwrap();
-        let frames = |motion| Frames {
-            which: Which {
+        let frames = |motion| DumpOptions {
+            which: FrameSelection {
                 single: vec![9],
                 ranges: Vec::new(),
                 pose: Vec::new(),
@@ -220,21 +219,21 @@ mod tests {
             all: false,
             out: folder.path().into(),
         };
-        let look = Look {
-            scene: Some(Named("cube")),
+        let options = FrameOptions {
+            scene: Some("cube"),
             mapper: Mapper::parse("exact"),
             order: None,
         };
-        let mut drawn = |motion| {
+        let mut draw = |motion| {
             let mut files = Vec::new();
             let wrote = |file: &Path| {
                 files.push(file.to_path_buf());
                 Ok(())
             };
-            frames(motion).write(&mut card, &look, wrote).unwrap();
+            frames(motion).write(&mut demo, &options, wrote).unwrap();
             Dump::read(&std::fs::read(&files[0]).unwrap()).unwrap()
         };
-        let again = drawn(Some(vec![yaw, pitch, roll, distance]));
+        let again = draw(Some(vec![yaw, pitch, roll, distance]));
         let start = again.header.start;
         assert_eq!(
             again.header,
@@ -244,27 +243,27 @@ mod tests {
             }
         );
         assert!(again.pixels == shown.pixels && again.palette == shown.palette);
-        let whole = drawn(None);
-        assert_eq!(whole.header.motion, None);
-        assert!(whole.pixels != shown.pixels);
+        let full = draw(None);
+        assert_eq!(full.header.motion, None);
+        assert!(full.pixels != shown.pixels);
         // The same frame in both qualities gives different files: neither overwrites the other.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 4);
     }
 
     #[test]
-    fn ranges_are_half_open_unless_they_say_otherwise() {
+    fn a_range_excludes_its_end_unless_it_is_written_with_an_equals_sign() {
         assert_eq!(range("0..2"), Ok(0..=1));
         assert_eq!(range("7..=7"), Ok(7..=7));
         assert_eq!(range("4294967295..=4294967295"), Ok(u32::MAX..=u32::MAX));
         for (text, why) in [
-            ("5", "written A..B"),
-            ("..5", "no frame number"),
-            ("5..", "no frame number"),
-            ("0..x", "no frame number"),
-            ("0..4294967296", "no frame number"),
-            ("0..0", "no frame in it"),
-            ("5..5", "no frame in it"),
-            ("6..=5", "no frame in it"),
+            ("5", "as A..B"),
+            ("..5", "not a frame number"),
+            ("5..", "not a frame number"),
+            ("0..x", "not a frame number"),
+            ("0..4294967296", "not a frame number"),
+            ("0..0", "the range has no frame"),
+            ("5..5", "the range has no frame"),
+            ("6..=5", "the range has no frame"),
         ] {
             let error = range(text).unwrap_err();
             assert!(error.contains(why), "{text}: {error}");

@@ -43,9 +43,9 @@ use verdict::Evidence;
 pub use verdict::{Failure, Found, Verdict};
 use watchdog::Watchdog;
 
-use frames::card::Card;
+use frames::backend::Backend;
 use frames::dump::Dump;
-use frames::screen::Screen;
+use frames::rgb::RgbImage;
 use setup::Ready;
 use system::quote::quoted;
 use system::{Interrupted, interrupted};
@@ -422,7 +422,7 @@ impl Machine {
             if self.run.paused.is_some() {
                 self.control("query-status", json!({}))?;
             } else {
-                self.ask(Command::Counts)?;
+                self.send(Command::Counts)?;
             }
         }
     }
@@ -638,7 +638,7 @@ impl Machine {
     /// Takes a last screendump if QEMU still can, and keeps it unless one was kept before.
     fn keep_screen(&mut self) {
         let bytes = self.request_file("screendump", json!({}));
-        let screen = bytes.and_then(|bytes| Screen::from_ppm(&bytes).ok());
+        let screen = bytes.and_then(|bytes| RgbImage::from_ppm(&bytes).ok());
         // The first screen, taken when the report came, is the one to look at.
         if self.evidence.screen.is_none() {
             self.evidence.screen = screen;
@@ -680,9 +680,9 @@ impl Nameless {
     }
 }
 
-impl Card for Machine {
+impl Backend for Machine {
     /// Sends the command and waits for the answer. An error is a [`Failure`], or the kernel's `error` line.
-    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
+    fn send(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
         self.send_line(&command.to_string())?;
         let mut answer = self.answer(&command.to_string())?;
         match answer.pop() {
@@ -697,7 +697,7 @@ impl Card for Machine {
     /// A malformed dump gives [`Verdict::Garbled`]: the line was garbled in a way that no single line's
     /// checksum shows.
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
-        let lines = self.ask(Command::Dump(content))?;
+        let lines = self.send(Command::Dump(content))?;
         Dump::from_lines(&lines).map_err(|error| {
             let why = format!("its dump is wrong in {error}");
             self.fail(Verdict::Garbled { why })
@@ -705,14 +705,14 @@ impl Card for Machine {
     }
 
     /// Returns QEMU's `screendump`.
-    fn screen(&mut self) -> anyhow::Result<Screen> {
+    fn screen(&mut self) -> anyhow::Result<RgbImage> {
         let mut file = Nameless::new()?;
         let reply = self.control("screendump", json!({ "filename": file.path() }))?;
         if let Some(error) = reply.get("error") {
             bail!("QEMU takes no screendump: {error}");
         }
         let bytes = file.bytes().context("QEMU's screendump cannot be read")?;
-        Screen::from_ppm(&bytes).context("QEMU's screendump is no frame")
+        RgbImage::from_ppm(&bytes).context("QEMU's screendump is no frame")
     }
 }
 

@@ -9,7 +9,7 @@ use std::process::ExitStatus;
 use std::time::SystemTime;
 
 use super::option::{names_accelerator, option};
-use frames::screen::Screen;
+use frames::rgb::RgbImage;
 
 /// MiB of memory with which the image boots on every QEMU version tried: 7.2 needs 25, versions from 10 on up
 /// to 32.
@@ -256,7 +256,7 @@ pub(super) struct Evidence {
     /// Everything on the serial line, in a file without a name.
     pub serial: Option<File>,
     /// The last screendump.
-    pub screen: Option<Screen>,
+    pub screen: Option<RgbImage>,
 }
 
 impl Evidence {

@@ -1,4 +1,4 @@
-//! `bless`: acceptance of changed golden frames.
+//! `bless`: accepts changed golden frames.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use crate::common::Common;
 /// Examples for the help.
 pub const HELP: &str = "\
 Examples:
-  cargo run -- bless                accept frames that were meant to change, after a look at the report
+  cargo run -- bless                write the changed frames of tests/golden; look at each before you commit
   cargo run -- bless tests/golden   the same, with the folder named";
 
 /// Writes the PNGs of changed goldens, if QEMU agrees.

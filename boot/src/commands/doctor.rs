@@ -1,4 +1,4 @@
-//! `doctor`: what is set up, and what is missing.
+//! `doctor`: reports what is set up, and what is missing.
 
 use std::process::ExitCode;
 
@@ -8,8 +8,8 @@ use crate::output::Output;
 /// Examples for the help.
 pub const HELP: &str = "\
 Examples:
-  cargo run -- doctor                                       what `cargo run` would find here
-  cargo run -- doctor --qemu /opt/bin/qemu-system-x86_64    whether this QEMU would do";
+  cargo run -- doctor                                       show what `cargo run` would use
+  cargo run -- doctor --qemu /opt/bin/qemu-system-x86_64    check this QEMU";
 
 /// Prints the report. Its exit code is 1 if something is missing that a run cannot get.
 pub fn run(mut common: Common) -> anyhow::Result<ExitCode> {

@@ -1,4 +1,4 @@
-//! `image`: the disk image.
+//! `image`: writes the disk image.
 
 use std::fs::File;
 use std::io;
@@ -19,10 +19,11 @@ Examples:
 pub fn run(mut common: Common, out: &Path) -> anyhow::Result<()> {
     common.load_to_boot()?;
     let image = setup::image(&common.options)?;
-    let mut from = File::open(&image).with_context(|| format!("{} is gone", image.display()))?;
+    let mut from =
+        File::open(&image).with_context(|| format!("{}: cannot be read", image.display()))?;
     let bytes = write_atomically(out, |file| Ok(io::copy(&mut from, file)?))?;
     say(format_args!(
-        "{}: {bytes} bytes; boots on a PC BIOS with a VGA",
+        "{}: {bytes} bytes; the image boots on a PC with a BIOS and a VGA",
         out.display()
     ));
     Ok(())

@@ -1,9 +1,9 @@
-//! `record`: an animation.
+//! `record`: writes an animation.
 
 use std::process::ExitCode;
 
-use frames::card::{self, Emulated};
-use frames::record::Options;
+use frames::backend::{self, EmulatedDemo};
+use frames::record::RecordOptions;
 use import::Model;
 use system::say;
 
@@ -17,8 +17,8 @@ Examples:
   cargo run -- record --scene knot --every 6 --out knot.gif     ten frames a second
   cargo run -- record --frames 0..60 --every 1 --out frames     every frame of a second, as PNGs";
 
-/// Boots, and records what QEMU's card holds. Wrong options give exit code 2.
-pub fn run(mut common: Common, options: &Options) -> anyhow::Result<ExitCode> {
+/// Boots, and records what QEMU's VGA holds. Wrong options give exit code 2.
+pub fn run(mut common: Common, options: &RecordOptions) -> anyhow::Result<ExitCode> {
     if let Err(error) = options.check() {
         say(format_args!("error: {error}"));
         return Ok(ExitCode::from(2));
@@ -26,9 +26,14 @@ pub fn run(mut common: Common, options: &Options) -> anyhow::Result<ExitCode> {
     let model = common.load_to_boot()?;
     let mut machine = common.boot(model.as_ref())?;
     let model_file = model.as_ref().map(Model::file);
-    let mut memory = card::memory();
-    let mut emulated = Emulated::with(&mut memory, model_file.as_ref())?;
-    options.record(&mut machine, &mut emulated, &common.look, print_path)?;
+    let mut memory = backend::memory();
+    let mut emulated = EmulatedDemo::with(&mut memory, model_file.as_ref())?;
+    options.record(
+        &mut machine,
+        &mut emulated,
+        &common.frame_options,
+        print_path,
+    )?;
     machine.leave()?;
     Ok(ExitCode::SUCCESS)
 }

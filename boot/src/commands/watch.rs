@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use crystal_ball::window;
-use frames::card::Card;
-use frames::look::Look;
+use frames::backend::Backend;
+use frames::options::FrameOptions;
 use protocol::{Action, Change, Command};
 use qemu::{Config, Machine};
 use system::{say, write_atomically};
@@ -12,19 +12,19 @@ use system::{say, write_atomically};
 use crate::common::{Common, has_display};
 use crate::output::print_path;
 
-/// The time for which the solid turns before its PNG is taken, without a display.
+/// The time for which the solid turns before the PNG is written, without a display.
 const WARM_UP: Duration = Duration::from_secs(1);
 
-/// Boots the image in a window; without a display, or with `--headless`, boots it and leaves a PNG.
+/// Boots the image in a window; without a display, or with `--headless`, boots it and writes a PNG.
 pub fn run(mut common: Common) -> anyhow::Result<()> {
     let model = common.load_to_boot()?;
     let headless = common.headless;
     common.options.window = !headless && has_display();
     let ready = setup::ready(&common.options)?;
     let config = common.config(&ready, model.as_ref());
-    let look = &common.look;
+    let frame_options = &common.frame_options;
     let displays = &ready.qemu.displays;
-    // GTK's window scales the frame with its size only with this option.
+    // Only with this option does GTK scale the frame to the window's size.
     let display = [("gtk", "gtk,zoom-to-fit=on"), ("sdl", "sdl")]
         .into_iter()
         .find(|(name, _)| displays.iter().any(|display| display == name))
@@ -32,13 +32,13 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
         .map(|(_, display)| display);
     if display.is_none() && !headless {
         let why = if has_display() {
-            "this QEMU has no window (on Debian, install the package qemu-system-gui)"
+            "this QEMU cannot open a window; on Debian, install the package qemu-system-gui"
         } else {
-            "there is no display (neither DISPLAY nor WAYLAND_DISPLAY is set)"
+            "no display: neither DISPLAY nor WAYLAND_DISPLAY is set"
         };
-        say(format_args!("{why}: booting without a window"));
+        say(format_args!("{why}; booting without a window"));
     }
-    let name = png_name(look, config.model_file);
+    let name = png_name(frame_options, config.model_file);
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
     let mut machine = Machine::boot(&Config {
@@ -47,20 +47,20 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
     })?;
     machine.wait_until_running()?;
     if display.is_some() {
-        // SDL's window takes the size of the card's mode when QEMU next reads the screen, which is now.
+        // SDL's window gets the size of the VGA's mode when QEMU next reads the screen, which is now.
         machine.screen()?;
         // If the window cannot be enlarged, it stays as small as QEMU made it.
         let _ = window::enlarge(machine.process());
     }
-    for command in look.commands() {
-        machine.ask(command)?;
+    for command in frame_options.commands() {
+        machine.send(command)?;
     }
     let seconds = start.elapsed().as_secs_f64();
     say(format_args!(
-        "the first frame is on the screen after {seconds:.1} s"
+        "the first frame is on the screen {seconds:.1} s after the start"
     ));
     if display.is_some() {
-        machine.ask(Command::Steer(None, Change::Act(Action::Hint)))?;
+        machine.send(Command::Steer(None, Change::Act(Action::Hint)))?;
         say("press H in the window to see the keys; close it or press Ctrl-C to end the run");
         return machine.watch();
     }
@@ -74,9 +74,9 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
 }
 
 /// Returns the name of a run's PNG. Two runs at once that show different things write different files.
-fn png_name(look: &Look, model_file: Option<u32>) -> String {
+fn png_name(frame_options: &FrameOptions, model_file: Option<u32>) -> String {
     let mut name = String::from("frame");
-    for command in look.commands() {
+    for command in frame_options.commands() {
         if let Command::Set(_, Some(word)) = command {
             // A tolerance is a fraction.
             name += &format!("-{word}").replace('/', "_");

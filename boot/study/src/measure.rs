@@ -20,7 +20,7 @@ use system::Step;
 
 mod accesses;
 
-pub use accesses::{Accesses, Emulated, Memories};
+pub use accesses::{Accesses, BenchMemories, EmulatedBenches};
 
 /// A CPU model of QEMU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,7 +52,7 @@ impl fmt::Display for Cpu {
 
 /// The parts to measure.
 #[derive(Clone, Debug)]
-pub struct Config {
+pub struct MeasureConfig {
     /// The options of the set-up.
     pub options: Options,
     /// The CPU models. Each one needs a few minutes.
@@ -62,10 +62,10 @@ pub struct Config {
     /// The rounds of which times are the median, 1 to [`MAX_ROUNDS`].
     pub rounds: usize,
     /// Whether to measure spans of each length separately, too.
-    pub runs: bool,
+    pub spans: bool,
 }
 
-impl Default for Config {
+impl Default for MeasureConfig {
     /// Returns the configuration that measures everything, in five rounds.
     fn default() -> Self {
         Self {
@@ -73,61 +73,61 @@ impl Default for Config {
             cpus: Cpu::ALL.to_vec(),
             mappers: Mapper::ALL.iter().map(|&(_, mapper, _)| mapper).collect(),
             rounds: 5,
-            runs: true,
+            spans: true,
         }
     }
 }
 
 /// The measured figures.
 #[derive(Clone, Debug)]
-pub struct Measured {
+pub struct KernelFigures {
     /// QEMU's version.
     pub qemu: String,
     /// The figures for each requested CPU model.
-    pub cpus: Vec<OnCpu>,
+    pub cpus: Vec<CpuFigures>,
 }
 
 /// The figures for one CPU model.
 #[derive(Clone, Debug)]
-pub struct OnCpu {
+pub struct CpuFigures {
     /// The model.
     pub cpu: Cpu,
     /// Whether the kernel found BMI2 on the model.
     pub bmi2: bool,
     /// A row for each mapper in each of [`Order::ALL`].
-    pub rows: Vec<Row>,
+    pub rows: Vec<KernelRow>,
 }
 
-impl OnCpu {
+impl CpuFigures {
     /// Returns the row of a mapper and an order.
-    pub fn row(&self, mapper: Mapper, order: Order) -> Option<&Row> {
-        let found = |row: &&Row| row.mapper == mapper && row.order == order;
+    pub fn row(&self, mapper: Mapper, order: Order) -> Option<&KernelRow> {
+        let found = |row: &&KernelRow| row.mapper == mapper && row.order == order;
         self.rows.iter().find(found)
     }
 }
 
 /// The costs of a mapper in an order.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct KernelRow {
     /// The mapper.
     pub mapper: Mapper,
     /// The order.
     pub order: Order,
     /// The cost of each piece of work. The references ([`Work::BareRam`], [`Work::BareCard`],
     /// [`Work::Present`]) ran in the same rounds as the other work.
-    pub works: BTreeMap<Work, Cost>,
-    /// The costs of spans of one length, drawn in RAM; empty unless [`Config::runs`] was set.
-    pub runs: Vec<RunCost>,
+    pub works: BTreeMap<Work, WorkCost>,
+    /// The costs of spans of one length, drawn in RAM; empty unless [`MeasureConfig::spans`] was set.
+    pub spans: Vec<SpanCost>,
     /// The accesses of one frame of the ball to the emulated VGA.
     pub accesses: Accesses,
 }
 
-impl Row {
+impl KernelRow {
     /// Returns the cost of a piece of work.
     ///
     /// # Panics
     /// Never: a row has all of [`Work::ALL`].
-    pub fn cost(&self, work: Work) -> &Cost {
+    pub fn cost(&self, work: Work) -> &WorkCost {
         &self.works[&work]
     }
 
@@ -143,17 +143,17 @@ impl Row {
     }
 
     /// Returns the time of a whole frame of the ball, relative to bare byte stores of as many pixels.
-    pub fn frame_over_bare(&self) -> Spread {
+    pub fn frame_over_bare(&self) -> TimeRatio {
         self.ratio(self.whole_frame(), Work::BareCard)
     }
 
     /// Returns the time of a whole frame of the ball, relative to presenting the same bytes already drawn.
-    pub fn frame_over_present(&self) -> Spread {
+    pub fn frame_over_present(&self) -> TimeRatio {
         self.ratio(self.whole_frame(), Work::Present)
     }
 
     /// Returns the time a pixel of `work`, relative to that of `over`, round by round.
-    pub fn ratio(&self, work: Work, over: Work) -> Spread {
+    pub fn ratio(&self, work: Work, over: Work) -> TimeRatio {
         self.cost(work).over(self.cost(over))
     }
 }
@@ -168,7 +168,7 @@ fn whole_frame(order: Order) -> Work {
 
 /// The cost of a piece of work.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Cost {
+pub struct WorkCost {
     /// The pixels that it draws.
     pub pixels: u64,
     /// The instructions, exact.
@@ -178,14 +178,14 @@ pub struct Cost {
     pub ticks: Vec<u64>,
 }
 
-impl Cost {
+impl WorkCost {
     /// Returns the instructions a pixel.
     pub fn instructions_a_pixel(&self) -> f64 {
         self.instructions as f64 / self.pixels as f64
     }
 
     /// Returns the time a pixel, relative to the other cost's, round by round.
-    pub fn over(&self, other: &Self) -> Spread {
+    pub fn over(&self, other: &Self) -> TimeRatio {
         let a_pixel = |cost: &Self, ticks: u64| ticks as f64 / cost.pixels as f64;
         let rounds = self.ticks.iter().zip(&other.ticks);
         let mut ratios: Vec<f64> = rounds
@@ -194,7 +194,7 @@ impl Cost {
         let least = |cost: &Self| cost.ticks.iter().copied().min().unwrap_or(0);
         let undisturbed = a_pixel(self, least(self)) / a_pixel(other, least(other));
         ratios.sort_by(f64::total_cmp);
-        Spread {
+        TimeRatio {
             median: ratios[ratios.len() / 2],
             least: ratios[0],
             most: ratios[ratios.len() - 1],
@@ -205,7 +205,7 @@ impl Cost {
 
 /// A ratio of times.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
+pub struct TimeRatio {
     /// The median of the rounds' ratios.
     pub median: f64,
     /// The smallest of the rounds' ratios.
@@ -217,7 +217,7 @@ pub struct Spread {
     pub undisturbed: f64,
 }
 
-impl fmt::Display for Spread {
+impl fmt::Display for TimeRatio {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             median,
@@ -234,13 +234,13 @@ impl fmt::Display for Spread {
 
 /// The costs of spans of one length.
 #[derive(Clone, Debug)]
-pub struct RunCost {
+pub struct SpanCost {
     /// The pixels of each span.
     pub length: u16,
     /// The cost of making the jobs of a face with such spans.
-    pub jobs: Cost,
+    pub jobs: WorkCost,
     /// The cost of drawing the jobs in RAM.
-    pub draw: Cost,
+    pub draw: WorkCost,
 }
 
 /// Builds the benchmark kernel if necessary, boots it, and measures the parts that `config` names.
@@ -248,14 +248,15 @@ pub struct RunCost {
 /// # Errors
 /// As [`setup::ready`]; a [`qemu::Failure`]; counts that do not repeat under `-icount`; and frames that
 /// differ from the emulated VGA's.
-pub fn run(config: &Config) -> anyhow::Result<Measured> {
+pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
     ensure!(
         (1..=MAX_ROUNDS).contains(&config.rounds),
-        "rounds are 1 to {MAX_ROUNDS}"
+        "{} rounds; the limits are 1 to {MAX_ROUNDS}",
+        config.rounds
     );
     let ready = setup::ready_to_measure(&config.options)?;
-    let mut memories = Memories::default();
-    let mut emulated = Emulated::new(&mut memories);
+    let mut memories = BenchMemories::default();
+    let mut emulated = EmulatedBenches::new(&mut memories);
     let all = config.cpus.len() * config.mappers.len() * Order::ALL.len() * 2;
     let mut step = Step::counting("measuring in QEMU", all as u64);
     let mut done = 0..;
@@ -265,41 +266,41 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
         let mut counting = Guest::boot(&ready, cpu, &["-icount", "shift=0"])?;
         let a_tick = counting.ticks_an_instruction()?;
         let mut counted = Vec::new();
-        for (mapper, order) in asked(config) {
-            counted.push(counting.measure(mapper, order, 2, config.runs)?);
+        for (mapper, order) in combinations(config) {
+            counted.push(counting.measure(mapper, order, 2, config.spans)?);
             tick();
         }
         counting.machine.leave()?;
         let mut timing = Guest::boot(&ready, cpu, &[])?;
         let mut rows = Vec::new();
-        for ((mapper, order), counted) in asked(config).zip(counted) {
+        for ((mapper, order), counted) in combinations(config).zip(counted) {
             emulated.compare(
                 mapper,
                 order,
-                &timing.ask(BenchRequest::Check(mapper, order))?,
+                &timing.send(BenchRequest::Check(mapper, order))?,
             )?;
-            let timed = timing.measure(mapper, order, config.rounds, config.runs)?;
+            let timed = timing.measure(mapper, order, config.rounds, config.spans)?;
             tick();
-            rows.push(Row {
+            rows.push(KernelRow {
                 mapper,
                 order,
                 works: counted.costs(&timed, a_tick)?,
-                runs: counted.run_costs(&timed, a_tick)?,
+                spans: counted.span_costs(&timed, a_tick)?,
                 accesses: emulated.accesses(mapper, order)?,
             });
         }
         let bmi2 = timing.has_bmi2()?;
         timing.machine.leave()?;
-        cpus.push(OnCpu { cpu, bmi2, rows });
+        cpus.push(CpuFigures { cpu, bmi2, rows });
     }
-    Ok(Measured {
+    Ok(KernelFigures {
         qemu: ready.qemu.version.clone(),
         cpus,
     })
 }
 
 /// Returns the mappers and orders to measure.
-fn asked(config: &Config) -> impl Iterator<Item = (Mapper, Order)> {
+fn combinations(config: &MeasureConfig) -> impl Iterator<Item = (Mapper, Order)> {
     let mappers = config.mappers.iter();
     mappers.flat_map(|&mapper| Order::ALL.map(|(_, order, _)| (mapper, order)))
 }
@@ -322,14 +323,14 @@ impl Guest {
     }
 
     /// Sends a request, and returns the lines of the answer without its last line.
-    fn ask(&mut self, ask: BenchRequest) -> anyhow::Result<Vec<String>> {
-        let ask = ask.to_string();
-        self.machine.send_line(&ask)?;
-        let mut answer = self.machine.answer(&ask)?;
+    fn send(&mut self, request: BenchRequest) -> anyhow::Result<Vec<String>> {
+        let request = request.to_string();
+        self.machine.send_line(&request)?;
+        let mut answer = self.machine.answer(&request)?;
         match answer.pop() {
-            Some(last) if last == format!("{OK} {ask}") => Ok(answer),
+            Some(last) if last == format!("{OK} {request}") => Ok(answer),
             last => bail!(
-                "the measuring kernel answered '{ask}' with '{}'",
+                "the benchmark kernel refused '{request}': {}",
                 last.unwrap_or_default()
             ),
         }
@@ -340,27 +341,30 @@ impl Guest {
     /// # Errors
     /// If the clock does not count instructions.
     fn ticks_an_instruction(&mut self) -> anyhow::Result<u64> {
-        let answer = self.ask(BenchRequest::Calibrate)?;
+        let answer = self.send(BenchRequest::Calibrate)?;
         let words: Vec<&str> = answer
             .first()
             .map_or("", String::as_str)
             .split(' ')
             .collect();
         let ["instructions", instructions, "ticks", ticks] = words[..] else {
-            bail!("the measuring kernel calibrates with {answer:?}");
+            bail!(
+                "the benchmark kernel answered '{}' with {answer:?}; expected 'instructions N ticks N'",
+                BenchRequest::Calibrate
+            );
         };
         let (instructions, ticks): (u64, u64) = (instructions.parse()?, ticks.parse()?);
         let each = ticks.checked_div(instructions).unwrap_or(0);
         ensure!(
             each > 0 && each * instructions == ticks,
-            "under -icount QEMU's time stamp counter should count instructions, and it counts \
-             {ticks} ticks for {instructions} of them"
+            "under -icount QEMU's time stamp counter must count instructions, but it counted {ticks} \
+             ticks for {instructions} instructions"
         );
         Ok(each)
     }
 
     fn has_bmi2(&mut self) -> anyhow::Result<bool> {
-        let answer = self.ask(BenchRequest::Calibrate)?;
+        let answer = self.send(BenchRequest::Calibrate)?;
         Ok(answer.iter().any(|line| line == "bmi2 yes"))
     }
 
@@ -369,24 +373,24 @@ impl Guest {
         mapper: Mapper,
         order: Order,
         rounds: usize,
-        runs: bool,
-    ) -> anyhow::Result<Told> {
+        spans: bool,
+    ) -> anyhow::Result<Reported> {
         let mut figures = self.figures(BenchRequest::Measure(mapper, order, rounds))?;
-        if runs {
+        if spans {
             figures.append(&mut self.figures(BenchRequest::Spans(mapper, order, rounds))?);
         }
-        Ok(Told { figures })
+        Ok(Reported { figures })
     }
 
     /// Requests figures, and returns them by name.
-    fn figures(&mut self, ask: BenchRequest) -> anyhow::Result<BTreeMap<String, Figure>> {
-        let answer = self.ask(ask)?;
+    fn figures(&mut self, request: BenchRequest) -> anyhow::Result<BTreeMap<String, Figure>> {
+        let answer = self.send(request)?;
         let figures = answer.iter().map(|line| {
             let mut words = line.split(' ');
             let name = words.next().unwrap_or_default().to_string();
             let figure = Figure::parse(words);
             figure.map(|figure| (name, figure)).with_context(|| {
-                format!("the measuring kernel answered '{ask}' with '{line}', which is no figure")
+                format!("the benchmark kernel answered '{request}' with '{line}'; expected figures")
             })
         });
         figures.collect()
@@ -394,45 +398,46 @@ impl Guest {
 }
 
 /// The figures of one machine for a mapper and an order.
-struct Told {
+struct Reported {
     figures: BTreeMap<String, Figure>,
 }
 
-impl Told {
+impl Reported {
     /// Returns the costs of all work, with the instructions of `self` and the times of `timed`.
-    fn costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<BTreeMap<Work, Cost>> {
+    fn costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<BTreeMap<Work, WorkCost>> {
         let all = Work::ALL.iter();
         all.map(|&work| Ok((work, self.cost(&work.to_string(), timed, a_tick)?)))
             .collect()
     }
 
-    fn run_costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<Vec<RunCost>> {
+    fn span_costs(&self, timed: &Self, a_tick: u64) -> anyhow::Result<Vec<SpanCost>> {
         let name = |length| format!("span-{length}-jobs");
         let lengths = LENGTHS.into_iter();
-        let told = lengths.filter(|&length| self.figures.contains_key(&name(length)));
-        told.map(|length| {
-            Ok(RunCost {
-                length,
-                jobs: self.cost(&name(length), timed, a_tick)?,
-                draw: self.cost(&format!("span-{length}-draw"), timed, a_tick)?,
+        let reported = lengths.filter(|&length| self.figures.contains_key(&name(length)));
+        reported
+            .map(|length| {
+                Ok(SpanCost {
+                    length,
+                    jobs: self.cost(&name(length), timed, a_tick)?,
+                    draw: self.cost(&format!("span-{length}-draw"), timed, a_tick)?,
+                })
             })
-        })
-        .collect()
+            .collect()
     }
 
-    fn cost(&self, name: &str, timed: &Self, a_tick: u64) -> anyhow::Result<Cost> {
-        let figure = |told: &Self| {
-            let figure = told.figures.get(name).copied();
-            figure.with_context(|| format!("the measuring kernel told nothing of '{name}'"))
+    fn cost(&self, name: &str, timed: &Self, a_tick: u64) -> anyhow::Result<WorkCost> {
+        let figure = |reported: &Self| {
+            let figure = reported.figures.get(name).copied();
+            figure.with_context(|| format!("'{name}': the benchmark kernel reported no figure"))
         };
         let (counted, timed) = (figure(self)?, figure(timed)?);
         ensure!(
             counted.pixels() == timed.pixels(),
-            "'{name}' drew {} pixels under -icount and {} without",
+            "'{name}': {} pixels under -icount, {} without; both must draw the same",
             counted.pixels(),
             timed.pixels()
         );
-        Ok(Cost {
+        Ok(WorkCost {
             pixels: counted.pixels(),
             instructions: repeated(name, &counted, a_tick)?,
             ticks: timed.ticks().to_vec(),
@@ -445,8 +450,8 @@ fn repeated(name: &str, figure: &Figure, a_tick: u64) -> anyhow::Result<u64> {
     let ticks = figure.ticks();
     ensure!(
         ticks.iter().all(|other| other == &ticks[0]) && ticks[0].is_multiple_of(a_tick),
-        "under -icount '{name}' took {ticks:?} ticks of {a_tick} for an instruction: \
-         it does not repeat"
+        "'{name}': rounds under -icount must have equal ticks, a multiple of {a_tick}; they have \
+         {ticks:?}"
     );
     Ok(ticks[0] / a_tick)
 }
@@ -461,22 +466,22 @@ mod tests {
         figure
     }
 
-    fn told(name: &str, figure: Figure) -> Told {
-        Told {
+    fn reported(name: &str, figure: Figure) -> Reported {
+        Reported {
             figures: BTreeMap::from([(name.to_string(), figure)]),
         }
     }
 
     #[test]
-    fn ratios_are_of_the_same_round_and_a_pixel_each() {
-        let cost = |pixels, ticks: &[u64]| Cost {
+    fn a_ratio_compares_times_a_pixel_of_the_same_round() {
+        let cost = |pixels, ticks: &[u64]| WorkCost {
             pixels,
             instructions: 0,
             ticks: ticks.to_vec(),
         };
         // A disturbance lengthened the second round of both, and the third round of the reference alone.
         let ratio = cost(10, &[20, 200, 22]).over(&cost(5, &[20, 100, 40]));
-        let expected = Spread {
+        let expected = TimeRatio {
             median: 0.5,
             least: 0.275,
             most: 1.0,
@@ -486,20 +491,20 @@ mod tests {
     }
 
     #[test]
-    fn figures_that_do_not_repeat_are_an_error() {
-        let timed = told("screen-ram", figure(7, &[100, 90]));
-        let cost = |counted| told("screen-ram", counted).cost("screen-ram", &timed, 2);
+    fn instructions_that_differ_between_rounds_are_an_error() {
+        let timed = reported("screen-ram", figure(7, &[100, 90]));
+        let cost = |counted| reported("screen-ram", counted).cost("screen-ram", &timed, 2);
         let good = cost(figure(7, &[60, 60])).unwrap();
         assert_eq!((good.instructions, good.ticks), (30, vec![100, 90]));
         for (bad, why) in [
-            (figure(7, &[60, 62]), "does not repeat"),
-            (figure(7, &[61, 61]), "does not repeat"),
-            (figure(8, &[60, 60]), "drew 8 pixels under -icount and 7"),
+            (figure(7, &[60, 62]), "must have equal ticks"),
+            (figure(7, &[61, 61]), "must have equal ticks"),
+            (figure(8, &[60, 60]), "8 pixels under -icount, 7 without"),
         ] {
             let error = cost(bad).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
-        let missing = told("bare-ram", figure(7, &[60])).cost("screen-ram", &timed, 2);
+        let missing = reported("bare-ram", figure(7, &[60])).cost("screen-ram", &timed, 2);
         assert!(missing.is_err());
     }
 }

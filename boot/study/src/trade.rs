@@ -27,27 +27,27 @@ use scene::catalogue::Entry;
 use texmap::loops::Loop;
 use texmap::{Mapper, Order};
 
-use crate::measure::{self, Measured};
+use crate::measure::{self, KernelFigures};
 use system::Step;
 use system::write_atomically;
 
 pub mod accuracy;
+pub mod claims;
 pub mod clock;
 pub mod cost;
 pub mod kernel;
 pub mod page;
 pub mod plot;
-pub mod seeds;
 pub mod stats;
-pub mod subject;
 pub mod table;
+pub mod workload;
 
-use accuracy::Jobs;
-use cost::{Effort, ROUNDS, SWEEPS, Swept};
-use page::{Gallery, Page};
-use plot::{Line, Point};
-use subject::Subject;
-use table::{Row, Table};
+use accuracy::FrameJobs;
+use cost::{Effort, ROUNDS, SWEEPS, SweepPoint};
+use page::{Gallery, TradePage};
+use plot::{PlotLine, PlotPoint};
+use table::{Table, TableRow};
+use workload::Workload;
 
 /// The default seed of the random scene. A fixed seed gives the same polygons in every run.
 const SEED: u64 = 57;
@@ -80,22 +80,22 @@ const BY_LENGTH: [&str; 8] = [
     "exact",
 ];
 
-/// The options of the measurement, and the folder for its results.
+/// The options of `trade`: what to measure, and the folder for the results.
 #[derive(Clone, Debug, clap::Args)]
-pub struct Options {
-    /// The folder for the results [default: target/crystal-ball/trade of the workspace]
+pub struct TradeOptions {
+    /// The folder for the results [default: target/crystal-ball/trade in the workspace]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Measure only these scenes, separated by commas; `--scene` names one
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(subject::names()))]
+    /// Measure only these scenes, separated by commas
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(workload::names()))]
     pub scenes: Vec<String>,
-    /// Measure only these mappers, separated by commas; `--mapper` names one
+    /// Measure only these mappers, separated by commas
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = PossibleValuesParser::new(mapper_names()))]
     pub mappers: Vec<String>,
-    /// Measure quickly, a twentieth of the time for each value: for a first look, not for reliable times
+    /// Spend a twentieth of the time on each value: enough for a first look, not for reliable times
     #[arg(long)]
     quick: bool,
-    /// Leave out the kernel's costs under QEMU
+    /// Measure on the host only, without the kernel's costs under QEMU
     #[arg(long)]
     host_only: bool,
     /// The seed of the random polygons
@@ -114,7 +114,7 @@ fn mapper_names() -> impl Iterator<Item = &'static str> {
 pub fn check_build() -> anyhow::Result<()> {
     ensure!(
         !cfg!(debug_assertions),
-        "a debug build measures its own checks: use `cargo run --release -- trade`"
+        "a debug build's times include its checks; use `cargo run --release -- trade`"
     );
     Ok(())
 }
@@ -125,7 +125,7 @@ pub fn check_build() -> anyhow::Result<()> {
 /// # Errors
 /// If the benchmark kernel cannot be run, or a file cannot be written.
 pub fn run(
-    options: &Options,
+    options: &TradeOptions,
     setup: setup::Options,
     model: Option<&ModelFile<'_>>,
 ) -> anyhow::Result<PathBuf> {
@@ -142,7 +142,7 @@ pub fn run(
         .map(|named| named.1)
         .collect();
     let model_alone = model.is_some() && options.scenes.is_empty();
-    let scenes: Vec<_> = subject::names()
+    let scenes: Vec<_> = workload::names()
         .filter(|name| !model_alone && chosen(&options.scenes, name))
         .chain(model.map(|entry| entry.name))
         .collect();
@@ -151,19 +151,19 @@ pub fn run(
         false => Effort::FULL,
     };
     fs::create_dir_all(out.join("images"))
-        .with_context(|| format!("{} cannot be made", out.display()))?;
-    // The kernel comes first, so that a missing part of its set-up is reported at once.
+        .with_context(|| format!("{}: the folder cannot be created", out.display()))?;
+    // The kernel comes first, so that a missing part of the set-up is reported at once.
     let measured = match options.host_only {
         true => None,
-        false => Some(measure::run(&measure::Config {
+        false => Some(measure::run(&measure::MeasureConfig {
             options: setup,
             mappers: mappers.clone(),
             rounds: if options.quick { 1 } else { 5 },
-            runs: false,
-            ..measure::Config::default()
+            spans: false,
+            ..measure::MeasureConfig::default()
         })?),
     };
-    let found = Found {
+    let found = Results {
         kernel: measured,
         ..measure(&scenes, model.as_ref(), &mappers, options.seed, effort)
     };
@@ -173,25 +173,25 @@ pub fn run(
 }
 
 /// Returns lines about the run and about the machine.
-fn about(options: &Options, mappers: &[Mapper]) -> Vec<String> {
+fn about(options: &TradeOptions, mappers: &[Mapper]) -> Vec<String> {
     let unit = clock::UNIT;
     let mut about = vec![
         format!("On {}.", clock::cpu()),
         format!(
-            "Errors in texels, against the exact quotient at the pixel's centre. Costs in {unit} \
-             a pixel, median of {ROUNDS} rounds ± half their spread, drawn into RAM; in brackets \
-             as a ratio to a bare load and store a pixel in the same order. \"To packed\": to \
-             `packed` by polygons."
+            "Errors are in texels, from the exact quotient at the pixel's centre. Costs are in {unit} \
+             a pixel, drawn into RAM: the median of {ROUNDS} rounds ± half the distance from least \
+             to most. In brackets: the ratio to a bare load and store a pixel in the same order. \"To \
+             packed\": the ratio to `packed` by polygons."
         ),
     ];
     if options.quick {
-        about.push("A quick run: its times are to look at, not to rely on.".into());
+        about.push("This was a quick run: its times are a first look, not reliable.".into());
     }
     let extract = Mapper::Affine(Loop::Extract);
     if mappers.contains(&extract) {
         about.push(match cost::beyond_baseline(extract) {
-            Some(_) => "`extract` needs BMI2: \"without\" is its portable twin.".into(),
-            None => "This CPU has no BMI2: `extract` is its portable twin.".into(),
+            Some(_) => "`extract` needs BMI2; \"without\" is its portable reference.".into(),
+            None => "This CPU has no BMI2, so `extract` is its portable reference here.".into(),
         });
     }
     about
@@ -199,15 +199,15 @@ fn about(options: &Options, mappers: &[Mapper]) -> Vec<String> {
 
 /// The results of all measurements.
 #[derive(Debug)]
-struct Found {
+struct Results {
     /// A table for each scene.
     tables: Vec<Table>,
     galleries: Vec<Gallery>,
-    swept: Vec<Swept>,
+    sweep: Vec<SweepPoint>,
     unrolling: stats::Spread,
     tilts: Option<Vec<(f64, accuracy::Accuracy)>>,
-    column: Option<(u16, Vec<Line>)>,
-    kernel: Option<Measured>,
+    column: Option<(u16, Vec<PlotLine>)>,
+    kernel: Option<KernelFigures>,
 }
 
 fn measure(
@@ -216,69 +216,69 @@ fn measure(
     mappers: &[Mapper],
     seed: u64,
     effort: Effort,
-) -> Found {
-    let mut jobs = Box::new(Jobs::new());
+) -> Results {
+    let mut jobs = Box::new(FrameJobs::new());
     let mut tables = Vec::new();
     let mut galleries = Vec::new();
     let mut column = None;
     let mut step = Step::counting("measuring scenes", scenes.len() as u64);
     for (done, name) in (1..).zip(scenes) {
-        let look = |subject: &Subject<'_>| {
-            let number = TIMED.min(subject.frames.len() - 1);
-            let mut costs = cost::measure(subject, number, mappers, effort).into_iter();
-            let rows = mappers.iter().map(|&mapper| Row {
+        let add = |workload: &Workload<'_>| {
+            let number = TIMED.min(workload.frames.len() - 1);
+            let mut costs = cost::measure(workload, number, mappers, effort).into_iter();
+            let rows = mappers.iter().map(|&mapper| TableRow {
                 mapper,
-                accuracy: accuracy::measure(subject, mapper, &mut jobs),
+                accuracy: accuracy::measure(workload, mapper, &mut jobs),
                 costs: costs.by_ref().take(cost::ORDERS.len()).collect(),
             });
             let rows = rows.collect();
             if SHOWN.contains(name) || *name == Entry::LOADED || scenes.len() == 1 {
-                galleries.push(Gallery::new(subject, mappers, &mut jobs));
+                galleries.push(Gallery::new(workload, mappers, &mut jobs));
             }
             if *name == COLUMN {
-                column = along_column(subject);
+                column = along_column(workload);
             }
             tables.push(Table {
-                scene: subject.name.into(),
-                about: subject.about.clone(),
+                scene: workload.name.into(),
+                about: workload.about.clone(),
                 rows,
             });
         };
         match model.filter(|entry| entry.name == *name) {
-            Some(entry) => subject::with_entry(entry, look),
-            None => subject::with(name, seed, look),
+            Some(entry) => workload::with_entry(entry, add),
+            None => workload::with(name, seed, add),
         }
         step.at(done);
     }
     drop(step);
-    let mut step = Step::counting("sweeping run lengths and angles", SWEEPS as u64);
+    let mut step = Step::counting("sweeping span lengths and angles", SWEEPS as u64);
     let mut done = 0;
-    let (swept, unrolling) = subject::with("tilted", seed, |subject| {
-        let swept = cost::sweep(subject, mappers, effort, || {
+    let (sweep, unrolling) = workload::with("tilted", seed, |workload| {
+        let sweep = cost::sweep(workload, mappers, effort, || {
             done += 1;
             step.at(done);
         });
-        (swept, cost::unrolling(subject, effort))
+        (sweep, cost::unrolling(workload, effort))
     });
     drop(step);
-    Found {
+    Results {
         tables,
         galleries,
-        swept,
+        sweep,
         unrolling,
-        tilts: seeds::tilts(),
+        tilts: claims::tilts(),
         column,
         kernel: None,
     }
 }
 
-/// Returns the longest column of a subject's first frame, and the errors of some mappers along it.
-fn along_column(subject: &Subject<'_>) -> Option<(u16, Vec<Line>)> {
-    let faces = &subject.frames[0];
+/// Returns the longest column of a workload's first frame, and the errors of some mappers along it.
+fn along_column(workload: &Workload<'_>) -> Option<(u16, Vec<PlotLine>)> {
+    let faces = &workload.frames[0];
     let mut pixels = BTreeMap::new();
     let errors = |mapper, sink: &mut dyn FnMut((u16, u16), f64)| {
         for face in faces {
-            let texture = subject.texture(face.face().texture);
+            let texture = workload.texture(face.face().texture);
             accuracy::errors(mapper, face, texture, |place, error, _| sink(place, error));
         }
     };
@@ -294,7 +294,7 @@ fn along_column(subject: &Subject<'_>) -> Option<(u16, Vec<Line>)> {
             }
         });
         let at = at.into_iter().map(|(y, error)| (f64::from(y), error));
-        Some(Line {
+        Some(PlotLine {
             name: (*name).into(),
             at: at.collect(),
         })
@@ -303,7 +303,7 @@ fn along_column(subject: &Subject<'_>) -> Option<(u16, Vec<Line>)> {
     Some((column, lines))
 }
 
-impl Found {
+impl Results {
     /// Writes all files. The page comes last, so that the files that it names exist.
     fn write(&self, out: &Path, about: &[String]) -> anyhow::Result<()> {
         let put = |name: &str, text: &str| {
@@ -318,24 +318,24 @@ impl Found {
         for (name, _, svg) in &plots {
             put(name, svg)?;
         }
-        let trials = seeds::trials(
+        let claims = claims::all(
             &self.tables,
-            &self.swept,
+            &self.sweep,
             self.unrolling,
             self.tilts.as_deref(),
         );
-        let trials = seeds::cells(&trials);
+        let claims = claims::cells(&claims);
 
         let mut extra = vec![(
-            String::from("aims"),
-            "What was aimed at, and what this run measured.".to_string(),
-            kernel::targets(&self.tables, &self.swept, self.kernel.as_ref()),
+            String::from("targets"),
+            "The project's targets, and the values that this run measured.".to_string(),
+            kernel::targets(&self.tables, &self.sweep, self.kernel.as_ref()),
         )];
         if let Some(measured) = &self.kernel {
             let about = format!(
-                "In QEMU {}: instructions under `-icount shift=0`, exact; writes and reads of a \
-                 frame of the ball, exact; times of its whole frame under plain TCG, medians of \
-                 five rounds (least to most).",
+                "In QEMU {}. Instructions are counted under `-icount shift=0`, and accesses of a frame \
+                 of the ball on the emulated VGA; both are exact. Times of the whole frame are \
+                 measured under plain TCG: the median of the rounds (least to most).",
                 measured.qemu
             );
             extra.push(("the kernel".into(), about, kernel::cells(measured)));
@@ -355,11 +355,11 @@ impl Found {
             text += &table::markdown(cells);
             text.push('\n');
         }
-        text += "## The seeds on trial\n\n";
-        text += &table::markdown(&trials).replace("---:", "---");
+        text += "## The sources' claims, measured\n\n";
+        text += &table::markdown(&claims).replace("---:", "---");
         put("trade.md", &text)?;
         put("trade.csv", &table::csv(&self.tables))?;
-        put("sweep.csv", &table::sweep_csv(&self.swept))?;
+        put("sweep.csv", &table::sweep_csv(&self.sweep))?;
 
         let folder = "images";
         for gallery in &self.galleries {
@@ -381,13 +381,13 @@ impl Found {
             })
             .chain(extra)
             .collect();
-        let page = Page {
+        let page = TradePage {
             about,
             plots: &plots,
             galleries: &self.galleries,
             folder,
             tables: &cells,
-            trials: &trials,
+            claims: &claims,
         };
         put("trade.html", &page.html())
     }
@@ -401,7 +401,7 @@ impl Found {
         let shown = shown.filter(|shown| shown.scene != table.scene);
         for (file, table) in [("error-cost.svg", Some(table)), (ONE_SCENE, shown)] {
             let Some(table) = table else { continue };
-            let points = table.rows.iter().map(|row| Point {
+            let points = table.rows.iter().map(|row| PlotPoint {
                 mapper: row.mapper,
                 cost: row.best().frame.time.median,
                 error: row.accuracy.errors.percentile(0.99),
@@ -411,7 +411,7 @@ impl Found {
             let svg = plot::error_against_cost(
                 [
                     &format!("Error against cost: {}", table.scene),
-                    "whole frames in RAM, in the cheaper of both orders",
+                    "whole frames in RAM, in the cheaper of the two orders",
                 ],
                 [
                     &format!("{unit} a pixel"),
@@ -419,16 +419,16 @@ impl Found {
                 ],
                 &points,
             )?;
-            let caption = "99 of 100 pixels err by less than the height says. The exact mapper is \
-                           off by the last bit of a 16.16 coordinate, which is how coordinates are \
-                           told; its texels are exact.";
+            let caption = "99 of 100 pixels have an error of at most the point's height. Coordinates \
+                           are 16.16 fixed point, so the exact mapper's error is at most the last \
+                           bit; its texels are exact.";
             plots.push((file, caption.into(), svg));
         }
         if let Some((column, lines)) = &self.column {
             plots.push((
                 "error-column.svg",
-                "Each mapper touches the truth where it divides, and strays between. Below 1/65536 \
-                 texel coordinates are not told apart."
+                "Each mapper is exact where it divides, and deviates between. Errors below 1/65536 \
+                 texel are drawn at 1/65536, the last bit of a coordinate."
                     .into(),
                 plot::lines(
                     [
@@ -444,17 +444,17 @@ impl Found {
         }
         let by_length = BY_LENGTH.iter().filter_map(|name| {
             let mapper = Mapper::parse(name)?;
-            let of = |swept: &&Swept| {
-                swept.mapper == mapper && swept.order == Order::Planes && swept.angle == cost::ANGLE
+            let of = |point: &&SweepPoint| {
+                point.mapper == mapper && point.order == Order::Planes && point.angle == cost::ANGLE
             };
             let mut at: Vec<_> = self
-                .swept
+                .sweep
                 .iter()
                 .filter(of)
-                .map(|swept| (f64::from(swept.length), swept.cost.time.median))
+                .map(|point| (f64::from(point.length), point.cost.time.median))
                 .collect();
             at.sort_by(|a, b| a.0.total_cmp(&b.0));
-            (!at.is_empty()).then(|| Line {
+            (!at.is_empty()).then(|| PlotLine {
                 name: (*name).into(),
                 at,
             })
@@ -463,18 +463,18 @@ impl Found {
         if !by_length.is_empty() {
             plots.push((
                 "cost-length.svg",
-                "What a column costs before its first pixel shows in short runs. Rows are as wide \
-                 as the screen whatever the column's height."
+                "Short spans show what a column costs before its first pixel. The mappers of rows draw \
+                 rows as wide as the screen, at any span length."
                     .into(),
                 plot::lines(
                     [
-                        "Cost against run length",
+                        "Cost against span length",
                         &format!(
                             "drawing alone, plane by plane, the texture at {} degrees",
                             cost::ANGLE
                         ),
                     ],
-                    ["pixels in a column's run", &format!("{unit} a pixel")],
+                    ["pixels in a column's span", &format!("{unit} a pixel")],
                     0.01,
                     true,
                     &by_length,
@@ -497,7 +497,7 @@ mod tests {
 
     /// Measures and writes everything, with as little work as possible.
     #[test]
-    fn everything_is_written() {
+    fn a_run_writes_every_file() {
         let out = tempfile::tempdir().unwrap();
         let mappers = ["affine", "packed", "linear-16", "exact"];
         let mappers = mappers.map(|name| Mapper::parse(name).unwrap());
@@ -519,8 +519,8 @@ mod tests {
             "## tilted",
             "## wall",
             "## model",
-            "## aims",
-            "## The seeds on trial",
+            "## targets",
+            "## The sources' claims, measured",
         ] {
             assert!(md.contains(part), "{part}");
         }
@@ -529,7 +529,7 @@ mod tests {
             let svg = read(name);
             assert!(html.contains(svg.trim()), "{name}");
         }
-        // Every image that the page names exists.
+        // Each image that the page names exists.
         let named = html.split('"').filter(|part| part.starts_with("images/"));
         let mut count = 0;
         for name in named {

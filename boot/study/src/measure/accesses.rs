@@ -25,12 +25,12 @@ pub struct Accesses {
 
 /// The memory that the benches on the emulated VGAs borrow.
 #[derive(Debug)]
-pub struct Memories {
+pub struct BenchMemories {
     counted: InPlace<BenchMemory>,
     plain: InPlace<BenchMemory>,
 }
 
-impl Default for Memories {
+impl Default for BenchMemories {
     fn default() -> Self {
         let counted = in_place::boxed!(BenchMemory);
         let plain = counted.clone();
@@ -40,7 +40,7 @@ impl Default for Memories {
 
 /// Two benches with the benchmark kernel's work on emulated VGAs: with counters and without.
 #[derive(Debug)]
-pub struct Emulated<'a> {
+pub struct EmulatedBenches<'a> {
     counted: Bench<'a, Counted<Vga>>,
     plain: Bench<'a, Vga>,
 }
@@ -52,14 +52,14 @@ const NO_CLOCK: Clock = Clock {
     bmi2: false,
 };
 
-impl<'a> Emulated<'a> {
+impl<'a> EmulatedBenches<'a> {
     /// Returns benches whose emulated VGAs are in the state after the mode set.
-    pub fn new(memories: &'a mut Memories) -> Self {
-        let taken = "the emulated card takes Mode X";
+    pub fn new(memories: &'a mut BenchMemories) -> Self {
+        let accepted = "the emulated VGA accepts the mode set";
         let counted = Counted::new(Vga::new());
         Self {
-            counted: Bench::new(&mut memories.counted, counted).expect(taken),
-            plain: Bench::new(&mut memories.plain, Vga::new()).expect(taken),
+            counted: Bench::new(&mut memories.counted, counted).expect(accepted),
+            plain: Bench::new(&mut memories.plain, Vga::new()).expect(accepted),
         }
     }
 
@@ -82,11 +82,11 @@ impl<'a> Emulated<'a> {
         let (counts, again) = (one(), one());
         let faults = bench.bus().inner().take_faults();
         if let Some(fault) = faults.first() {
-            bail!("the emulated card finds an access at fault: {fault}");
+            bail!("{mapper} in the order {order}: the emulated VGA found a fault: {fault}");
         }
         ensure!(
             counts == again,
-            "the accesses of {mapper} in the order {order} do not repeat: {counts:?}, {again:?}"
+            "{mapper} in the order {order}: two frames have different accesses: {counts:?}, {again:?}"
         );
         let frames = u64::from(work.frames());
         let each = |tally: Tally| Tally {
@@ -116,7 +116,7 @@ impl<'a> Emulated<'a> {
         let mut faults = self.plain.bus().take_faults();
         faults.append(&mut self.counted.bus().inner().take_faults());
         if let Some(fault) = faults.first() {
-            bail!("the emulated card finds an access at fault: {fault}");
+            bail!("{mapper} in the order {order}: the emulated VGA found a fault: {fault}");
         }
         Ok([plain, counted])
     }
@@ -125,12 +125,17 @@ impl<'a> Emulated<'a> {
     ///
     /// # Errors
     /// A frame that differs.
-    pub fn compare(&mut self, mapper: Mapper, order: Order, told: &[String]) -> anyhow::Result<()> {
+    pub fn compare(
+        &mut self,
+        mapper: Mapper,
+        order: Order,
+        kernel: &[String],
+    ) -> anyhow::Result<()> {
         for emulated in self.checksums(mapper, order)? {
             ensure!(
-                told == emulated,
-                "{mapper} in the order {order} draws {told:?} in QEMU and {emulated:?} on the \
-                 emulated card"
+                kernel == emulated,
+                "{mapper} in the order {order}: QEMU's VGA has the checksums {kernel:?}, the emulated \
+                 VGA has {emulated:?}"
             );
         }
         Ok(())

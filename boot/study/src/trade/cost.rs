@@ -12,30 +12,30 @@ use texmap::loops::Loop;
 use texmap::plane::Anchor;
 use texmap::{Job, Mapper, Order, Renderer, Texture, Vertex, Walk};
 
-use super::accuracy::Jobs;
+use super::accuracy::FrameJobs;
 use super::clock;
 use super::stats::Spread;
-use super::subject::{Owned, Subject};
+use super::workload::{OwnedFace, Workload};
 
 /// The number of rounds. The reported value is their median.
 pub const ROUNDS: usize = 5;
 
 /// The orders that differ in RAM. [`Order::Buffer`] draws as one of them does, and its presenting costs time
-/// only where a card exists.
+/// only on a VGA.
 pub const ORDERS: [Order; 2] = [Order::Polygons, Order::Planes];
 
 /// The work that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum What {
+pub enum Scope {
     /// Drawing alone, of jobs made beforehand.
     Loops,
     /// A whole frame: making its jobs and drawing them.
     Frame,
 }
 
-/// The way in which the bare loop visits the pixels.
+/// The order in which the bare loop visits the pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
+enum Traversal {
     /// Down the columns.
     Columns,
     /// Along the rows, pixel by pixel.
@@ -46,40 +46,40 @@ enum Way {
 
 /// The code that draws.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Who {
+enum Drawer {
     /// A load and a store for each pixel, and nothing else.
-    Bare(Way),
+    Bare(Traversal),
     Mapper(Mapper),
     /// The portable reference of a mapper's loop.
-    Twin(Loop),
+    Portable(Loop),
 }
 
-impl Who {
+impl Drawer {
     /// Returns the bare loop that visits the pixels as the mapper does.
     fn bare(mapper: Mapper) -> Self {
         use texmap::Rows;
         Self::Bare(match mapper {
-            Mapper::Rows(Rows::Passes) => Way::Passes,
-            Mapper::Rows(_) => Way::Rows,
-            _ => Way::Columns,
+            Mapper::Rows(Rows::Passes) => Traversal::Passes,
+            Mapper::Rows(_) => Traversal::Rows,
+            _ => Traversal::Columns,
         })
     }
 }
 
-type Key = (Who, Order, What);
+type ContestantKey = (Drawer, Order, Scope);
 
 /// The memory that drawing needs.
-struct Arena {
+struct DrawMemory {
     page: Box<PlanarBuffer>,
-    jobs: Box<Jobs>,
+    jobs: Box<FrameJobs>,
 }
 
-type Draw<'a> = Box<dyn Fn(&mut Arena) + 'a>;
+type DrawFn<'a> = Box<dyn Fn(&mut DrawMemory) + 'a>;
 
 struct Contestant<'a> {
-    key: Key,
+    key: ContestantKey,
     pixels: u64,
-    draw: Draw<'a>,
+    draw: DrawFn<'a>,
 }
 
 /// Returns the mapper's loop, if this CPU runs it with instructions that not every CPU of its architecture
@@ -93,7 +93,7 @@ pub fn beyond_baseline(mapper: Mapper) -> Option<Loop> {
 
 /// The cost of drawing a pixel.
 #[derive(Clone, Copy, Debug)]
-pub struct Cost {
+pub struct PixelCost {
     /// The time, in [`clock::UNIT`]s.
     pub time: Spread,
     /// The ratio to a bare load and store for each pixel, in the same order.
@@ -104,18 +104,18 @@ pub struct Cost {
 
 /// The costs of one mapper.
 #[derive(Clone, Copy, Debug)]
-pub struct Costs {
+pub struct MapperCost {
     /// The mapper.
     pub mapper: Mapper,
     /// The order.
     pub order: Order,
     /// The cost of drawing alone.
-    pub loops: Cost,
+    pub loops: PixelCost,
     /// The cost of the whole frame.
-    pub frame: Cost,
+    pub frame: PixelCost,
     /// The cost of drawing alone with the portable reference, for a loop whose instructions not every CPU
     /// has.
-    pub twin: Option<Cost>,
+    pub portable: Option<PixelCost>,
 }
 
 /// The time that a measurement may need.
@@ -136,17 +136,17 @@ impl Effort {
 ///
 /// # Panics
 /// If a face is not legal.
-fn jobs(mapper: Mapper, faces: &[Owned], subject: &Subject<'_>) -> (Vec<Job>, u64) {
+fn jobs(mapper: Mapper, faces: &[OwnedFace], workload: &Workload<'_>) -> (Vec<Job>, u64) {
     let mut jobs = Vec::new();
     for face in faces {
         let face = face.face();
-        let texture = subject.texture(face.texture);
+        let texture = workload.texture(face.texture);
         let made = mapper.jobs(&face, texture, |job| jobs.push(job));
         made.expect("a scene's faces are legal");
     }
     let mut pixels = 0;
     for job in &jobs {
-        job.pixels(subject.texture(job.texture), |_, _| pixels += 1);
+        job.pixels(workload.texture(job.texture), |_, _| pixels += 1);
     }
     (jobs, pixels)
 }
@@ -188,9 +188,9 @@ fn draw(
 }
 
 /// Draws affine columns with the portable reference of a loop.
-fn draw_by_twin(
+fn draw_by_portable(
     jobs: &[Job],
-    twin: Loop,
+    portable: Loop,
     order: Order,
     textures: &[Texture<'_>],
     page: &mut PlanarBuffer,
@@ -201,7 +201,7 @@ fn draw_by_twin(
         };
         let texture = &textures[usize::from(job.texture)];
         page.column(job.x, job.y, job.len, |column| {
-            twin.portable(texture, walk, column);
+            portable.portable(texture, walk, column);
         });
     };
     match order {
@@ -217,7 +217,13 @@ fn draw_by_twin(
 }
 
 /// Loads and stores a byte for every pixel of some jobs.
-fn bare(jobs: &[Job], way: Way, order: Order, texels: &[u8; 256], page: &mut PlanarBuffer) {
+fn bare(
+    jobs: &[Job],
+    traversal: Traversal,
+    order: Order,
+    texels: &[u8; 256],
+    page: &mut PlanarBuffer,
+) {
     // Only with a byte as the index does the compiler see that no bounds check is needed.
     let mut at = 0u8;
     let mut load = || {
@@ -231,13 +237,13 @@ fn bare(jobs: &[Job], way: Way, order: Order, texels: &[u8; 256], page: &mut Pla
             page.lane::<1>(job.x + first, job.y, len, |row| row.fill(&mut load));
         }
     };
-    match (order, way) {
-        (Order::Polygons, Way::Columns) => {
+    match (order, traversal) {
+        (Order::Polygons, Traversal::Columns) => {
             for job in jobs {
                 page.column(job.x, job.y, job.len, |column| column.fill(&mut load));
             }
         }
-        (Order::Planes | Order::Buffer, Way::Columns) => {
+        (Order::Planes | Order::Buffer, Traversal::Columns) => {
             for plane in 0..4 {
                 for job in jobs.iter().filter(|job| job.x & 3 == plane) {
                     page.lane(job.x, job.y, job.len, |column: modex::Column<'_>| {
@@ -246,17 +252,17 @@ fn bare(jobs: &[Job], way: Way, order: Order, texels: &[u8; 256], page: &mut Pla
                 }
             }
         }
-        (Order::Polygons, Way::Rows) => {
+        (Order::Polygons, Traversal::Rows) => {
             for job in jobs {
                 page.row(job.x, job.y, job.len, &mut load);
             }
         }
-        (Order::Polygons, Way::Passes) => {
+        (Order::Polygons, Traversal::Passes) => {
             for job in jobs {
                 (0..4).for_each(|plane| part(job, plane, page));
             }
         }
-        (Order::Planes | Order::Buffer, Way::Rows | Way::Passes) => {
+        (Order::Planes | Order::Buffer, Traversal::Rows | Traversal::Passes) => {
             for plane in 0..4 {
                 jobs.iter().for_each(|job| part(job, plane, page));
             }
@@ -267,62 +273,66 @@ fn bare(jobs: &[Job], way: Way, order: Order, texels: &[u8; 256], page: &mut Pla
 /// Returns every contestant on some faces: the mappers, and the bare loops that they are compared with.
 fn contestants<'a>(
     mappers: &[Mapper],
-    faces: &'a [Owned],
-    subject: &'a Subject<'_>,
-    what: &[What],
+    faces: &'a [OwnedFace],
+    workload: &'a Workload<'_>,
+    scope: &[Scope],
 ) -> Vec<Contestant<'a>> {
-    let texels: &[u8; 256] = subject.textures[0].texels()[..256]
+    let texels: &[u8; 256] = workload.textures[0].texels()[..256]
         .try_into()
         .expect("it was cut to 256");
     let mut all = Vec::new();
     let affine = Mapper::parse("affine").expect("it is one of all");
     let by_rows = Mapper::parse("row-steps").expect("it is one of all");
-    for (way, mapper) in [
-        (Way::Columns, affine),
-        (Way::Rows, by_rows),
-        (Way::Passes, by_rows),
+    for (traversal, mapper) in [
+        (Traversal::Columns, affine),
+        (Traversal::Rows, by_rows),
+        (Traversal::Passes, by_rows),
     ] {
-        if way != Way::Columns && !mappers.iter().any(|&m| Who::bare(m) == Who::Bare(way)) {
+        if traversal != Traversal::Columns
+            && !mappers
+                .iter()
+                .any(|&m| Drawer::bare(m) == Drawer::Bare(traversal))
+        {
             continue;
         }
         for order in ORDERS {
-            let (jobs, pixels) = in_order(order, jobs(mapper, faces, subject));
-            let axis = if way == Way::Columns {
+            let (jobs, pixels) = in_order(order, jobs(mapper, faces, workload));
+            let axis = if traversal == Traversal::Columns {
                 Axis::Down
             } else {
                 Axis::Right
             };
             assert!(jobs.iter().all(|job| job.axis == axis));
             all.push(Contestant {
-                key: (Who::Bare(way), order, What::Loops),
+                key: (Drawer::Bare(traversal), order, Scope::Loops),
                 pixels,
-                draw: Box::new(move |arena| bare(&jobs, way, order, texels, &mut arena.page)),
+                draw: Box::new(move |arena| bare(&jobs, traversal, order, texels, &mut arena.page)),
             });
         }
     }
-    for twin in mappers.iter().copied().filter_map(beyond_baseline) {
+    for portable in mappers.iter().copied().filter_map(beyond_baseline) {
         for order in ORDERS {
-            let (jobs, pixels) = in_order(order, jobs(affine, faces, subject));
+            let (jobs, pixels) = in_order(order, jobs(affine, faces, workload));
             all.push(Contestant {
-                key: (Who::Twin(twin), order, What::Loops),
+                key: (Drawer::Portable(portable), order, Scope::Loops),
                 pixels,
                 draw: Box::new(move |arena| {
-                    draw_by_twin(&jobs, twin, order, &subject.textures, &mut arena.page);
+                    draw_by_portable(&jobs, portable, order, &workload.textures, &mut arena.page);
                 }),
             });
         }
     }
     for &mapper in mappers {
         for order in ORDERS {
-            for &what in what {
-                let (jobs, pixels) = in_order(order, jobs(mapper, faces, subject));
-                let draw: Draw<'a> = match what {
-                    What::Loops => Box::new(move |arena| {
-                        draw(&jobs, mapper, order, &subject.textures, &mut arena.page);
+            for &scope in scope {
+                let (jobs, pixels) = in_order(order, jobs(mapper, faces, workload));
+                let draw: DrawFn<'a> = match scope {
+                    Scope::Loops => Box::new(move |arena| {
+                        draw(&jobs, mapper, order, &workload.textures, &mut arena.page);
                     }),
-                    What::Frame => Box::new(move |arena| {
-                        let Arena { page, jobs } = arena;
-                        let textures = &subject.textures;
+                    Scope::Frame => Box::new(move |arena| {
+                        let DrawMemory { page, jobs } = arena;
+                        let textures = &workload.textures;
                         let mut renderer =
                             Renderer::new(&mut **jobs, textures, &mut **page, mapper, order);
                         for face in faces {
@@ -332,7 +342,7 @@ fn contestants<'a>(
                     }),
                 };
                 all.push(Contestant {
-                    key: (Who::Mapper(mapper), order, what),
+                    key: (Drawer::Mapper(mapper), order, scope),
                     pixels,
                     draw,
                 });
@@ -344,9 +354,9 @@ fn contestants<'a>(
 
 /// Returns the time a pixel of each contestant in each round.
 fn race(contestants: &[Contestant<'_>], effort: Effort) -> Vec<Vec<f64>> {
-    let mut arena = Arena {
+    let mut arena = DrawMemory {
         page: Box::new(PlanarBuffer::new()),
-        jobs: Box::new(Jobs::new()),
+        jobs: Box::new(FrameJobs::new()),
     };
     let mut time = |contestant: &Contestant<'_>| {
         let start = clock::now();
@@ -377,62 +387,62 @@ fn ratio(times: &[f64], others: &[f64]) -> Spread {
 }
 
 /// The times of a race, by contestant.
-struct Times(Vec<(Key, Vec<f64>)>);
+struct Times(Vec<(ContestantKey, Vec<f64>)>);
 
 impl Times {
-    fn of(&self, key: Key) -> Option<&[f64]> {
+    fn of(&self, key: ContestantKey) -> Option<&[f64]> {
         let found = self.0.iter().find(|(known, _)| *known == key);
         found.map(|(_, times)| &times[..])
     }
 
-    fn cost(&self, mapper: Mapper, order: Order, what: What) -> Cost {
-        let cost = self.cost_of((Who::Mapper(mapper), order, what), Who::bare(mapper));
+    fn cost(&self, mapper: Mapper, order: Order, scope: Scope) -> PixelCost {
+        let cost = self.cost_of((Drawer::Mapper(mapper), order, scope), Drawer::bare(mapper));
         cost.expect("it took part")
     }
 
-    fn cost_of(&self, key: Key, bare: Who) -> Option<Cost> {
-        let (_, order, what) = key;
+    fn cost_of(&self, key: ContestantKey, bare: Drawer) -> Option<PixelCost> {
+        let (_, order, scope) = key;
         let times = self.of(key)?;
         let to = |key| match self.of(key) {
             Some(others) => ratio(times, others),
             None => Spread::of(&[f64::NAN]),
         };
         let packed = Mapper::parse("packed").expect("it is one of all");
-        Some(Cost {
+        Some(PixelCost {
             time: Spread::of(times),
-            to_bare: to((bare, order, What::Loops)),
-            to_packed: to((Who::Mapper(packed), Order::Polygons, what)),
+            to_bare: to((bare, order, Scope::Loops)),
+            to_packed: to((Drawer::Mapper(packed), Order::Polygons, scope)),
         })
     }
 }
 
-/// Returns the costs of `mappers` on a frame of a subject. `packed` always takes part.
+/// Returns the costs of `mappers` on a frame of a workload. `packed` always takes part.
 pub fn measure(
-    subject: &Subject<'_>,
+    workload: &Workload<'_>,
     number: usize,
     mappers: &[Mapper],
     effort: Effort,
-) -> Vec<Costs> {
+) -> Vec<MapperCost> {
     let mut all = mappers.to_vec();
     let packed = Mapper::parse("packed").expect("it is one of all");
     if !all.contains(&packed) {
         all.push(packed);
     }
-    let faces = &subject.frames[number];
-    let contestants = contestants(&all, faces, subject, &[What::Loops, What::Frame]);
+    let faces = &workload.frames[number];
+    let contestants = contestants(&all, faces, workload, &[Scope::Loops, Scope::Frame]);
     let raced = race(&contestants, effort);
     let times = Times(contestants.iter().map(|c| c.key).zip(raced).collect());
     let mut costs = Vec::new();
     for &mapper in mappers {
         for order in ORDERS {
-            costs.push(Costs {
+            costs.push(MapperCost {
                 mapper,
                 order,
-                loops: times.cost(mapper, order, What::Loops),
-                frame: times.cost(mapper, order, What::Frame),
-                twin: beyond_baseline(mapper).and_then(|twin| {
-                    let key = (Who::Twin(twin), order, What::Loops);
-                    times.cost_of(key, Who::bare(mapper))
+                loops: times.cost(mapper, order, Scope::Loops),
+                frame: times.cost(mapper, order, Scope::Frame),
+                portable: beyond_baseline(mapper).and_then(|portable| {
+                    let key = (Drawer::Portable(portable), order, Scope::Loops);
+                    times.cost_of(key, Drawer::bare(mapper))
                 }),
             });
         }
@@ -442,7 +452,7 @@ pub fn measure(
 
 /// The cost of drawing alone for spans of one length, with the texture at one angle.
 #[derive(Clone, Copy, Debug)]
-pub struct Swept {
+pub struct SweepPoint {
     /// The pixels of each span down a column.
     pub length: u16,
     /// The texture's angle on the screen, in degrees.
@@ -452,7 +462,36 @@ pub struct Swept {
     /// The order.
     pub order: Order,
     /// The cost of drawing alone.
-    pub cost: Cost,
+    pub cost: PixelCost,
+}
+
+/// The points of a sweep with spans of [`LENGTH`], at [`ANGLE`].
+#[derive(Clone, Copy, Debug)]
+pub struct LongSpans<'a>(pub &'a [SweepPoint]);
+
+impl<'a> LongSpans<'a> {
+    /// Returns the points of an order.
+    fn points(self, order: Order) -> impl Iterator<Item = &'a SweepPoint> {
+        let matches = move |point: &&SweepPoint| {
+            point.length == LENGTH && point.angle == ANGLE && point.order == order
+        };
+        self.0.iter().filter(matches)
+    }
+
+    /// Returns the point of the fastest affine column loop.
+    pub fn fastest_affine(self, order: Order) -> Option<&'a SweepPoint> {
+        let affine = self
+            .points(order)
+            .filter(|point| matches!(point.mapper, Mapper::Affine(_)));
+        affine.min_by(|a, b| a.cost.time.median.total_cmp(&b.cost.time.median))
+    }
+
+    /// Returns the median time of a mapper, if it was measured.
+    pub fn time(self, mapper: &str, order: Order) -> Option<f64> {
+        let mut points = self.points(order);
+        let point = points.find(|point| point.mapper.to_string() == mapper);
+        point.map(|point| point.cost.time.median)
+    }
 }
 
 /// The span lengths to sweep, at [`ANGLE`].
@@ -468,7 +507,7 @@ const SCALE: f64 = 0.63;
 
 /// Returns strips over the whole screen, each `length` pixels high, in one facing plane whose texture is
 /// rotated by `angle` degrees.
-fn strips(length: u16, angle: f64) -> Vec<Owned> {
+fn strips(length: u16, angle: f64) -> Vec<OwnedFace> {
     let (sin, cos) = angle.to_radians().sin_cos();
     let texel = |x: i32, y: i32| {
         let (x, y) = (f64::from(x - 160) * SCALE, f64::from(y - 120) * SCALE);
@@ -499,18 +538,18 @@ fn strips(length: u16, angle: f64) -> Vec<Owned> {
                 v,
             }
         });
-        Owned::from_parts(polygon.to_vec(), anchors)
+        OwnedFace::from_parts(polygon.to_vec(), anchors)
     };
     (0..240 / length).map(strip).collect()
 }
 
 /// Sweeps span lengths and angles. Calls `done` after each of the [`SWEEPS`] steps.
 pub fn sweep(
-    subject: &Subject<'_>,
+    workload: &Workload<'_>,
     mappers: &[Mapper],
     effort: Effort,
     mut done: impl FnMut(),
-) -> Vec<Swept> {
+) -> Vec<SweepPoint> {
     let mut all = mappers.to_vec();
     let packed = Mapper::parse("packed").expect("it is one of all");
     if !all.contains(&packed) {
@@ -518,37 +557,37 @@ pub fn sweep(
     }
     let lengths = LENGTHS.iter().map(|&length| (length, ANGLE));
     let angles = ANGLES.iter().map(|&angle| (LENGTH, angle));
-    let mut swept = Vec::new();
+    let mut points = Vec::new();
     for (length, angle) in lengths.chain(angles) {
         let faces = strips(length, angle);
-        let contestants = contestants(&all, &faces, subject, &[What::Loops]);
+        let contestants = contestants(&all, &faces, workload, &[Scope::Loops]);
         let raced = race(&contestants, effort);
         let times = Times(contestants.iter().map(|c| c.key).zip(raced).collect());
         for &mapper in mappers {
             for order in ORDERS {
-                swept.push(Swept {
+                points.push(SweepPoint {
                     length,
                     angle,
                     mapper,
                     order,
-                    cost: times.cost(mapper, order, What::Loops),
+                    cost: times.cost(mapper, order, Scope::Loops),
                 });
             }
         }
         done();
     }
-    swept
+    points
 }
 
 /// Returns the gain from unrolling: the time of a plain loop, relative to that of the same loop unrolled
 /// eight times, on the longest strips, plane by plane.
-pub fn unrolling(subject: &Subject<'_>, effort: Effort) -> Spread {
+pub fn unrolling(workload: &Workload<'_>, effort: Effort) -> Spread {
     let affine = Mapper::parse("affine").expect("it is one of all");
     let faces = strips(LENGTH, ANGLE);
-    let texels: &[u8; 1 << 16] = subject.textures[0]
+    let texels: &[u8; 1 << 16] = workload.textures[0]
         .texels()
         .try_into()
-        .expect("the subject's texture is the largest");
+        .expect("the workload's texture is the largest");
     let walk = |job: &Job| {
         let Walk::Affine(walk) = job.walk else {
             unreachable!("the mapper is affine");
@@ -562,8 +601,8 @@ pub fn unrolling(subject: &Subject<'_>, effort: Effort) -> Spread {
         }
     };
     let contestant = |unrolled: bool| {
-        let (jobs, pixels) = jobs(affine, &faces, subject);
-        let columns = move |arena: &mut Arena| {
+        let (jobs, pixels) = jobs(affine, &faces, workload);
+        let columns = move |arena: &mut DrawMemory| {
             for plane in 0..4 {
                 for job in jobs.iter().filter(|job| job.x & 3 == plane) {
                     let mut next = walk(job);
@@ -581,7 +620,11 @@ pub fn unrolling(subject: &Subject<'_>, effort: Effort) -> Spread {
             }
         };
         Contestant {
-            key: (Who::Bare(Way::Columns), Order::Planes, What::Loops),
+            key: (
+                Drawer::Bare(Traversal::Columns),
+                Order::Planes,
+                Scope::Loops,
+            ),
             pixels,
             draw: Box::new(columns),
         }
@@ -596,7 +639,7 @@ pub const SWEEPS: usize = LENGTHS.len() + ANGLES.len();
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trade::subject::with;
+    use crate::trade::workload::with;
 
     const TINY: Effort = Effort { slice: 1 };
 
@@ -607,13 +650,13 @@ mod tests {
     }
 
     #[test]
-    fn costs_are_of_every_mapper_in_every_order() {
-        with("tilted", 0, |subject| {
-            let costs = measure(subject, 1, &some(), TINY);
+    fn every_mapper_has_a_cost_in_every_order() {
+        with("tilted", 0, |workload| {
+            let costs = measure(workload, 1, &some(), TINY);
             assert_eq!(costs.len(), 2 * some().len());
             for costs in &costs {
-                let twin = beyond_baseline(costs.mapper);
-                assert_eq!(costs.twin.is_some(), twin.is_some());
+                let portable = beyond_baseline(costs.mapper);
+                assert_eq!(costs.portable.is_some(), portable.is_some());
                 for cost in [costs.loops, costs.frame] {
                     for spread in [cost.time, cost.to_bare, cost.to_packed] {
                         assert!(spread.least > 0.0 && spread.most.is_finite(), "{costs:?}");
@@ -633,20 +676,20 @@ mod tests {
     /// Checks that the timed code draws the right pixels: mappers draw the renderer's frame, and bare loops
     /// draw as many pixels.
     #[test]
-    fn contestants_draw_whole_frames() {
-        with("tilted", 0, |subject| {
+    fn every_contestant_draws_the_whole_frame() {
+        with("tilted", 0, |workload| {
             let mappers = some();
-            let faces = &subject.frames[1];
-            let all = contestants(&mappers, faces, subject, &[What::Loops, What::Frame]);
-            let twins = mappers
+            let faces = &workload.frames[1];
+            let all = contestants(&mappers, faces, workload, &[Scope::Loops, Scope::Frame]);
+            let portables = mappers
                 .iter()
                 .filter(|&&m| beyond_baseline(m).is_some())
                 .count();
-            assert_eq!(all.len(), 2 * (3 + twins + 2 * mappers.len()));
+            assert_eq!(all.len(), 2 * (3 + portables + 2 * mappers.len()));
             let drawn = |contestant: &Contestant<'_>| {
-                let mut arena = Arena {
+                let mut arena = DrawMemory {
                     page: Box::new(PlanarBuffer::new()),
-                    jobs: Box::new(Jobs::new()),
+                    jobs: Box::new(FrameJobs::new()),
                 };
                 // A colour that no lit texel has.
                 arena.page.planes = [[0; modex::PAGE_BYTES]; 4];
@@ -661,11 +704,13 @@ mod tests {
                 let page = drawn(contestant);
                 assert_eq!(touched(&page), contestant.pixels, "{:?}", contestant.key);
                 let mapper = match contestant.key.0 {
-                    Who::Bare(_) => continue,
-                    Who::Mapper(mapper) => mapper,
-                    Who::Twin(twin) => Mapper::Affine(twin),
+                    Drawer::Bare(_) => continue,
+                    Drawer::Mapper(mapper) => mapper,
+                    Drawer::Portable(portable) => Mapper::Affine(portable),
                 };
-                let same = all.iter().find(|other| other.key.0 == Who::Mapper(mapper));
+                let same = all
+                    .iter()
+                    .find(|other| other.key.0 == Drawer::Mapper(mapper));
                 assert!(page == drawn(same.unwrap()), "{:?}", contestant.key);
             }
         });
@@ -673,11 +718,11 @@ mod tests {
 
     #[test]
     fn strips_cover_the_screen_and_stay_in_the_texture() {
-        with("tilted", 0, |subject| {
+        with("tilted", 0, |workload| {
             for (length, angle) in [(1, 45.0), (64, 10.0), (240, 90.0)] {
                 let faces = strips(length, angle);
                 for mapper in some() {
-                    let (jobs, pixels) = jobs(mapper, &faces, subject);
+                    let (jobs, pixels) = jobs(mapper, &faces, workload);
                     assert_eq!(pixels, 320 * (240 / u64::from(length)) * u64::from(length));
                     if jobs[0].axis == Axis::Down {
                         assert!(jobs.iter().all(|job| job.len == length));

@@ -1,21 +1,19 @@
 //! The benchmark kernel's figures as a table, and the targets beside the measurements.
 
-use std::fmt::Display;
-
 use texmap::{Mapper, Order};
 
-use super::cost::{ANGLE, LENGTH, Swept};
+use super::cost::{LongSpans, SweepPoint};
 use super::table::Table;
-use crate::measure::{Cpu, Measured, Row, Spread};
+use crate::measure::{Cpu, KernelFigures, KernelRow, TimeRatio};
 
 /// Returns the kernel's table: a row for each mapper in each order, with the figures of the baseline CPU
 /// model, and the instructions of the other model.
-pub fn cells(measured: &Measured) -> Vec<Vec<String>> {
+pub fn cells(measured: &KernelFigures) -> Vec<Vec<String>> {
     let head = [
         "mapper",
         "order",
         "instructions a pixel, screen",
-        "the same with bit-extract",
+        "instructions a pixel, screen, with bit-extract",
         "instructions a pixel, ball",
         "port writes",
         "stores",
@@ -51,8 +49,8 @@ pub fn cells(measured: &Measured) -> Vec<Vec<String>> {
     cells
 }
 
-fn spread(ratio: Spread) -> String {
-    let Spread {
+fn spread(ratio: TimeRatio) -> String {
+    let TimeRatio {
         median,
         least,
         most,
@@ -61,65 +59,70 @@ fn spread(ratio: Spread) -> String {
     format!("{median:.2} ({least:.2} to {most:.2})")
 }
 
-fn of(measured: &Measured, cpu: Cpu) -> &[Row] {
+fn of(measured: &KernelFigures, cpu: Cpu) -> &[KernelRow] {
     let on = measured.cpus.iter().find(|on| on.cpu == cpu);
     on.map_or(&[], |on| &on.rows)
 }
 
-/// A figure of the run, if everything that it needs was measured.
-type Figure = Option<f64>;
-
 /// Returns the targets, the measured values, and whether each target is met.
-pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -> Vec<Vec<String>> {
+pub fn targets(
+    tables: &[Table],
+    sweep: &[SweepPoint],
+    measured: Option<&KernelFigures>,
+) -> Vec<Vec<String>> {
     let mut cells = vec![
-        ["what", "aimed at", "measured", ""]
+        ["figure", "target", "measured", ""]
             .map(String::from)
             .to_vec(),
     ];
-    let mut add = |what: &str, aimed: f64, most: bool, figure: Figure| {
+    let mut add = |what: &str, target: f64, most: bool, figure: Option<f64>| {
         let bound = if most { "at most" } else { "at least" };
-        let said = figure.map_or("not measured".into(), |figure| format!("{figure:.2}"));
+        let measured = figure.map_or("not measured".into(), |figure| format!("{figure:.2}"));
         let met = match figure.map(|figure| {
             if most {
-                figure <= aimed
+                figure <= target
             } else {
-                figure >= aimed
+                figure >= target
             }
         }) {
             Some(true) => "met",
             Some(false) => "missed",
             None => "",
         };
-        let aimed = format!("{bound} {aimed}");
-        cells.push(vec![what.into(), aimed, said, met.into()]);
+        let target = format!("{bound} {target}");
+        cells.push(vec![what.into(), target, measured, met.into()]);
     };
-    let host = Host { tables, swept };
+    let spans = LongSpans(sweep);
+    let frame_time = |scene, mapper| frame_time(tables, scene, mapper);
     add(
         "best affine column loop by planes, over a bare load and store",
         1.15,
         true,
-        host.best(Order::Planes)
-            .map(|swept| swept.cost.to_bare.median),
+        spans
+            .fastest_affine(Order::Planes)
+            .map(|point| point.cost.to_bare.median),
     );
-    let best = host.best(Order::Planes).map(|swept| swept.cost.time.median);
+    let best = spans
+        .fastest_affine(Order::Planes)
+        .map(|point| point.cost.time.median);
     add(
         "`packed` by polygons over the best by planes",
         2.5,
         false,
-        over(host.time("packed", Order::Polygons), best),
+        over(spans.time("packed", Order::Polygons), best),
     );
     add(
         "`row-multiply` by polygons over the best by planes, in RAM",
         4.0,
         false,
-        over(host.time("row-multiply", Order::Polygons), best),
+        over(spans.time("row-multiply", Order::Polygons), best),
     );
     // Polygon by polygon, because plane by plane the mappers of rows do not draw rows as their names say.
-    let screen = |cpu, mapper: fn(Mapper) -> bool| -> Figure {
+    let screen = |cpu, mapper: fn(Mapper) -> bool| -> Option<f64> {
         let rows = of(measured?, cpu).iter();
         let figures = rows
             .filter(|row| mapper(row.mapper) && row.order == Order::Polygons)
-            .map(Row::instructions_a_pixel);
+            .map(KernelRow::instructions_a_pixel);
         figures.min_by(f64::total_cmp)
     };
     let affine = |mapper| matches!(mapper, Mapper::Affine(_));
@@ -132,21 +135,21 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
     );
     let what = "instructions a pixel of the best affine loop, full screen, set-up included";
     add(what, 6.6, true, screen(Cpu::Baseline, affine));
-    let what = "the same with bit-extract";
+    let what = "instructions a pixel of the best affine loop with bit-extract, full screen, set-up included";
     add(what, 4.6, true, screen(Cpu::Max, affine));
     add(
         "`linear-16` over the best affine loop, by planes",
         1.6,
         true,
-        over(host.time("linear-16", Order::Planes), best),
+        over(spans.time("linear-16", Order::Planes), best),
     );
     add(
         "`within-1/2` over `affine` on the ball, whole frames",
         1.25,
         true,
         over(
-            host.frame("ball", "within-1/2"),
-            host.frame("ball", "affine"),
+            frame_time("ball", "within-1/2"),
+            frame_time("ball", "affine"),
         ),
     );
     add(
@@ -154,29 +157,29 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
         3.0,
         false,
         over(
-            host.frame("grazing-16", "exact"),
-            host.frame("grazing-16", "within-1/2"),
+            frame_time("grazing-16", "exact"),
+            frame_time("grazing-16", "within-1/2"),
         ),
     );
-    let masks = |order| -> Figure {
+    let masks = |order| -> Option<f64> {
         let rows = of(measured?, Cpu::Baseline).iter();
         let mut rows = rows.filter(|row| row.mapper == Mapper::default() && row.order == order);
         Some(rows.next()?.accesses.draw.map_mask as f64)
     };
     let what = "Map Mask writes of a frame of the ball by planes, drawing";
     add(what, 4.0, true, masks(Order::Planes));
-    let frame = |ratio: fn(&Row) -> f64| -> Figure {
+    let frame = |ratio: fn(&KernelRow) -> f64| -> Option<f64> {
         let rows = of(measured?, Cpu::Baseline).iter().map(ratio);
         rows.min_by(f64::total_cmp)
     };
     add(
-        "frame of the ball under TCG over bare byte stores of its pixels, best way",
+        "frame of the ball under TCG over bare byte stores of its pixels, fastest mapper",
         0.75,
         true,
         frame(|row| row.frame_over_bare().median),
     );
     add(
-        "frame of the ball under TCG over presenting it already drawn, best way",
+        "frame of the ball under TCG over presenting it already drawn, fastest mapper",
         1.25,
         true,
         frame(|row| row.frame_over_present().median),
@@ -184,48 +187,13 @@ pub fn targets(tables: &[Table], swept: &[Swept], measured: Option<&Measured>) -
     cells
 }
 
-fn over(a: Figure, b: Figure) -> Figure {
+fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     Some(a? / b?)
 }
 
-/// The measurements in RAM.
-struct Host<'a> {
-    tables: &'a [Table],
-    swept: &'a [Swept],
-}
-
-impl Host<'_> {
-    /// Returns the measurements of an order on long spans.
-    fn long(&self, order: Order) -> impl Iterator<Item = &Swept> {
-        let of = move |swept: &&Swept| {
-            swept.length == LENGTH && swept.angle == ANGLE && swept.order == order
-        };
-        self.swept.iter().filter(of)
-    }
-
-    /// Returns the affine column loop that is fastest on long spans.
-    fn best(&self, order: Order) -> Option<&Swept> {
-        let affine = self
-            .long(order)
-            .filter(|swept| matches!(swept.mapper, Mapper::Affine(_)));
-        affine.min_by(|a, b| a.cost.time.median.total_cmp(&b.cost.time.median))
-    }
-
-    /// Returns a mapper's time on long spans.
-    fn time(&self, mapper: &str, order: Order) -> Figure {
-        let swept = self
-            .long(order)
-            .find(|swept| swept.mapper.to_string() == mapper);
-        swept.map(|swept| swept.cost.time.median)
-    }
-
-    /// Returns the time of a scene's frame, in the cheaper of the orders.
-    fn frame(&self, scene: &str, mapper: impl Display) -> Figure {
-        let table = self.tables.iter().find(|table| table.scene == scene)?;
-        let row = table
-            .rows
-            .iter()
-            .find(|row| row.name() == mapper.to_string())?;
-        Some(row.best().frame.time.median)
-    }
+/// Returns the time of a scene's frame in RAM, in the cheaper of the orders.
+fn frame_time(tables: &[Table], scene: &str, mapper: &str) -> Option<f64> {
+    let table = tables.iter().find(|table| table.scene == scene)?;
+    let row = table.rows.iter().find(|row| row.name() == mapper)?;
+    Some(row.best().frame.time.median)
 }

@@ -5,12 +5,15 @@ use std::fmt::Write as _;
 use modex::{HEIGHT, WIDTH};
 use texmap::Mapper;
 
-use super::accuracy::{self, Accuracy, Jobs};
-use super::subject::Subject;
+use super::accuracy::{self, Accuracy, FrameJobs};
 use super::table::{decibels, percent, texels};
-use frames::indexed::Indexed;
-use frames::screen::Screen;
+use super::workload::Workload;
+use frames::html::{self, escape};
+use frames::indexed::IndexedImage;
+use frames::rgb::RgbImage;
 
+/// The page's title.
+const TITLE: &str = "What accuracy costs";
 /// The page's addition to the style sheet of the reports.
 const STYLE: &str = include_str!("page.css");
 
@@ -25,18 +28,18 @@ const COLOURS: [[u8; 3]; 6] = [
     [0xFB, 0x9A, 0x3C],
     [0xFF, 0xF5, 0xB0],
 ];
-/// The maps' colour where no solid is.
-const NOTHING: [u8; 3] = [0x4C, 0x4C, 0x4C];
+/// The maps' colour of the background.
+const BACKGROUND: [u8; 3] = [0x4C, 0x4C, 0x4C];
 
 /// A frame and the map of its errors, shared by all mappers that draw both alike.
 #[derive(Clone, Debug)]
-pub struct Shown {
+pub struct GalleryFrame {
     /// The mappers' names.
     pub mappers: Vec<String>,
     /// The frame.
-    pub image: Indexed,
+    pub image: IndexedImage,
     /// The map of the frame's errors.
-    pub heat: Screen,
+    pub heat: RgbImage,
     /// The mappers' accuracy on the frame.
     pub accuracy: Accuracy,
 }
@@ -49,48 +52,49 @@ pub struct Gallery {
     /// A line about the scene.
     pub about: String,
     /// The frames that differ.
-    pub shown: Vec<Shown>,
+    pub shown: Vec<GalleryFrame>,
 }
 
 impl Gallery {
-    /// Draws a subject's first frame with each mapper.
-    pub fn new(subject: &Subject<'_>, mappers: &[Mapper], jobs: &mut Jobs) -> Self {
-        let mut shown: Vec<Shown> = Vec::new();
+    /// Draws a workload's first frame with each mapper.
+    pub fn new(workload: &Workload<'_>, mappers: &[Mapper], jobs: &mut FrameJobs) -> Self {
+        let mut shown: Vec<GalleryFrame> = Vec::new();
         let colours = |pixels: &[u8]| {
-            let colours = pixels.iter().map(|&i| subject.palette[usize::from(i)]);
+            let colours = pixels.iter().map(|&i| workload.palette[usize::from(i)]);
             colours.collect::<Vec<_>>()
         };
-        let exact = colours(&accuracy::frame(subject, 0, Mapper::Exact, jobs));
+        let exact = colours(&accuracy::frame(workload, 0, Mapper::Exact, jobs));
         for &mapper in mappers {
-            let pixels = accuracy::frame(subject, 0, mapper, jobs);
+            let pixels = accuracy::frame(workload, 0, mapper, jobs);
             let mut accuracy = Accuracy {
                 psnr: super::stats::psnr(&colours(&pixels), &exact),
                 ..Accuracy::default()
             };
-            let mut heat = vec![NOTHING; WIDTH * HEIGHT];
-            for face in &subject.frames[0] {
-                let texture = subject.texture(face.face().texture);
+            let mut heat = vec![BACKGROUND; WIDTH * HEIGHT];
+            for face in &workload.frames[0] {
+                let texture = workload.texture(face.face().texture);
                 accuracy::errors(mapper, face, texture, |(x, y), error, other| {
                     heat[usize::from(y) * WIDTH + usize::from(x)] = colour(error);
                     accuracy.errors.add(error);
                     accuracy.other_texels += u64::from(other);
                 });
             }
-            let alike =
-                |s: &&mut Shown| s.image.pixels == pixels && s.accuracy.errors == accuracy.errors;
+            let alike = |s: &&mut GalleryFrame| {
+                s.image.pixels == pixels && s.accuracy.errors == accuracy.errors
+            };
             if let Some(same) = shown.iter_mut().find(alike) {
                 same.mappers.push(mapper.to_string());
                 continue;
             }
-            shown.push(Shown {
+            shown.push(GalleryFrame {
                 mappers: vec![mapper.to_string()],
-                image: Indexed {
+                image: IndexedImage {
                     width: WIDTH,
                     height: HEIGHT,
-                    palette: subject.palette.map(|c| c.map(|part| part >> 2)).to_vec(),
+                    palette: workload.palette.map(|c| c.map(|part| part >> 2)).to_vec(),
                     pixels,
                 },
-                heat: Screen {
+                heat: RgbImage {
                     width: WIDTH,
                     height: HEIGHT,
                     pixels: heat,
@@ -99,14 +103,14 @@ impl Gallery {
             });
         }
         Self {
-            scene: subject.name.into(),
-            about: subject.about.clone(),
+            scene: workload.name.into(),
+            about: workload.about.clone(),
             shown,
         }
     }
 
     /// Returns the file name of a frame, or of its map.
-    pub fn file(&self, shown: &Shown, map: bool) -> String {
+    pub fn file(&self, shown: &GalleryFrame, map: bool) -> String {
         let of = if map { "-error" } else { "" };
         // A mapper's name can have a slash.
         let mapper = shown.mappers[0].replace(|c: char| !c.is_ascii_alphanumeric(), "-");
@@ -118,7 +122,7 @@ impl Gallery {
         let _ = write!(
             page,
             "<section class=\"card\">\n<h2>The scene <code>{scene}</code></h2>\n<p>{about}. \
-             Mappers that are alike in every pixel share a frame.</p>\n<div class=\"gallery\">\n"
+             Mappers whose frames and errors are equal share an image.</p>\n<div class=\"gallery\">\n"
         );
         for shown in &self.shown {
             let names = shown.mappers.iter().map(|name| escape(name));
@@ -132,7 +136,7 @@ impl Gallery {
                  <img src=\"{folder}/{}\" alt=\"its errors\" width=\"320\" height=\"240\"></figure>",
                 texels(errors.largest()),
                 texels(errors.mean()),
-                percent(shown.accuracy.other_share()).replace('<', "&lt;"),
+                escape(&percent(shown.accuracy.other_share())),
                 decibels(shown.accuracy.psnr),
                 self.file(shown, false),
                 self.file(shown, true),
@@ -157,7 +161,7 @@ fn colour(error: f64) -> [u8; 3] {
 
 /// The parts of the page.
 #[derive(Debug)]
-pub struct Page<'a> {
+pub struct TradePage<'a> {
     /// Lines about the run and about the machine.
     pub about: &'a [String],
     /// The plots, each with a caption and the SVG.
@@ -169,21 +173,18 @@ pub struct Page<'a> {
     /// The tables, each with a title, a line about it, and the cells. The first table is shown open.
     pub tables: &'a [(String, String, Vec<Vec<String>>)],
     /// The cells of the table of the sources' claims.
-    pub trials: &'a [Vec<String>],
+    pub claims: &'a [Vec<String>],
 }
 
-impl Page<'_> {
+impl TradePage<'_> {
     /// Returns the page as HTML.
     pub fn html(&self) -> String {
-        let mut page = format!(
-            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <meta name=\"color-scheme\" content=\"light dark\">\n\
-             <title>What accuracy costs - Crystal Ball</title>\n<style>\n{}{STYLE}</style>\n</head>\n\
-             <body class=\"trade\">\n<header class=\"top\">\n\
+        let mut page = html::head(TITLE, STYLE);
+        let _ = write!(
+            page,
+            "<body class=\"trade\">\n<header class=\"top\">\n\
              <p class=\"brand\">Crystal Ball <span>trade</span></p>\n\
-             <h1>What accuracy costs</h1>\n",
-            frames::report::STYLE
+             <h1>{TITLE}</h1>\n"
         );
         for line in self.about {
             let _ = writeln!(page, "<p>{}</p>", escape(line));
@@ -224,10 +225,10 @@ impl Page<'_> {
         for gallery in self.galleries {
             gallery.section(&mut page, self.folder);
         }
-        page += "<section class=\"card trials\">\n<h2>The seeds on trial</h2>\n<p>What the book's \
-                 chapters 57 and 58 and the articles on perspective claim, of the machines of their \
-                 day, and what it comes to here.</p>\n";
-        table(&mut page, self.trials);
+        page += "<section class=\"card claims\">\n<h2>The sources' claims, measured</h2>\n<p>What the book's \
+                 chapters 57 and 58 and the articles on perspective claim for the machines of their \
+                 time, and what this run measured.</p>\n";
+        table(&mut page, self.claims);
         page += "</section>\n</main>\n</body>\n</html>\n";
         page
     }
@@ -235,7 +236,7 @@ impl Page<'_> {
 
 const LEGEND: &str = "<aside class=\"heat\"><span>Maps of the error, in texels:</span>\
                       <i></i><ol><li>1/256</li><li>1/32</li><li>1/4</li><li>2</li><li>8</li><li>32</li></ol>\
-                      <span>grey: no solid</span></aside>\n";
+                      <span>grey: background</span></aside>\n";
 
 /// Adds a table to the page. The first line of `cells` is the header.
 fn table(page: &mut String, cells: &[Vec<String>]) {
@@ -269,20 +270,13 @@ fn code(text: &str) -> String {
     out
 }
 
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trade::subject::with;
+    use crate::trade::workload::with;
 
     #[test]
-    fn colours_go_from_small_to_large_errors_and_the_legend_has_them() {
+    fn the_legend_has_the_colours_of_small_to_large_errors() {
         assert_eq!(colour(0.0), COLOURS[0]);
         assert_eq!(colour(1.0 / 256.0), COLOURS[0]);
         assert_eq!(colour(32.0), COLOURS[5]);
@@ -296,11 +290,11 @@ mod tests {
     }
 
     #[test]
-    fn the_page_names_every_file_and_fetches_nothing() {
+    fn the_page_names_every_image_and_loads_nothing_from_the_network() {
         let mappers = ["affine", "packed", "exact"].map(|name| Mapper::parse(name).unwrap());
-        let mut jobs = Box::new(Jobs::new());
-        let gallery = with("tilted", 0, |subject| {
-            Gallery::new(subject, &mappers, &mut jobs)
+        let mut jobs = Box::new(FrameJobs::new());
+        let gallery = with("tilted", 0, |workload| {
+            Gallery::new(workload, &mappers, &mut jobs)
         });
         let names = gallery.shown.iter().map(|shown| shown.mappers.len());
         assert_eq!(names.sum::<usize>(), 3);
@@ -310,8 +304,8 @@ mod tests {
             .find(|s| s.mappers[0] == "exact")
             .unwrap();
         assert_eq!(exact.accuracy.psnr, f64::INFINITY);
-        assert!(exact.heat.pixels.contains(&COLOURS[0]) && exact.heat.pixels.contains(&NOTHING));
-        let html = Page {
+        assert!(exact.heat.pixels.contains(&COLOURS[0]) && exact.heat.pixels.contains(&BACKGROUND));
+        let html = TradePage {
             about: &["a <b>".into()],
             plots: &[("caption".into(), "<svg></svg>".into())],
             galleries: std::slice::from_ref(&gallery),
@@ -321,7 +315,7 @@ mod tests {
                 "about".into(),
                 vec![vec!["h".into()], vec!["`c` < d".into()]],
             )],
-            trials: &[vec!["head".into()]],
+            claims: &[vec!["head".into()]],
         }
         .html();
         for shown in &gallery.shown {

@@ -18,7 +18,7 @@ const MARGINS: [i32; 4] = [96, 36, 92, 72];
 
 const INK: RGBColor = RGBColor(0x1B, 0x1B, 0x20);
 const SOFT: RGBColor = RGBColor(0x62, 0x62, 0x6E);
-const LINE: RGBColor = RGBColor(0xE4, 0xE4, 0xEA);
+const GRID: RGBColor = RGBColor(0xE4, 0xE4, 0xEA);
 const FRONT: RGBColor = RGBColor(0xC8, 0x10, 0x4F);
 const FONT: &str = "system-ui, 'Liberation Sans', 'DejaVu Sans', sans-serif";
 
@@ -48,7 +48,7 @@ fn family(mapper: Mapper) -> usize {
 
 /// A mapper in the plot of error against cost.
 #[derive(Clone, Debug)]
-pub struct Point {
+pub struct PlotPoint {
     /// The mapper.
     pub mapper: Mapper,
     /// The mapper's cost, above zero.
@@ -61,7 +61,7 @@ pub struct Point {
 
 /// A named line in a plot.
 #[derive(Clone, Debug)]
-pub struct Line {
+pub struct PlotLine {
     /// The line's name.
     pub name: String,
     /// The points: the pixel and the error in texels, or the span length and the cost.
@@ -70,7 +70,7 @@ pub struct Line {
 
 /// An axis with a logarithmic or a linear scale.
 #[derive(Clone, Copy, Debug)]
-struct Axis {
+struct PlotAxis {
     from: f64,
     to: f64,
     log: bool,
@@ -78,7 +78,7 @@ struct Axis {
     pixels: (i32, i32),
 }
 
-impl Axis {
+impl PlotAxis {
     /// Returns an axis that contains some values. A logarithmic axis has some room on both sides of them.
     fn around(values: impl Iterator<Item = f64>, log: bool, pixels: (i32, i32)) -> Self {
         let (mut from, mut to) = (f64::INFINITY, f64::NEG_INFINITY);
@@ -159,16 +159,16 @@ fn number(value: f64) -> String {
     }
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
+type Drawing<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 
 /// Returns the error of a drawing that fails.
 fn failed(error: impl std::fmt::Display) -> anyhow::Error {
-    anyhow!("a plot cannot be drawn: {error}")
+    anyhow!("the plot cannot be drawn: {error}")
 }
 
 /// Writes a text whose left end, middle or right end is at a position.
 fn write(
-    area: &Area<'_>,
+    area: &Drawing<'_>,
     text: &str,
     at: (i32, i32),
     size: i32,
@@ -184,9 +184,9 @@ fn write(
 
 /// Draws the frame of a plot: the title, the axes, their ticks and their names.
 fn frame(
-    area: &Area<'_>,
+    area: &Drawing<'_>,
     title: [&str; 2],
-    axes: (&Axis, &Axis),
+    axes: (&PlotAxis, &PlotAxis),
     names: [&str; 2],
 ) -> anyhow::Result<()> {
     area.fill(&WHITE).map_err(failed)?;
@@ -201,7 +201,7 @@ fn frame(
     };
     for tick in x.ticks() {
         let at = x.place(tick);
-        line((at, top), (at, bottom), LINE)?;
+        line((at, top), (at, bottom), GRID)?;
         write(
             area,
             &number(tick),
@@ -213,7 +213,7 @@ fn frame(
     }
     for tick in y.ticks() {
         let at = y.place(tick);
-        line((left, at), (right, at), LINE)?;
+        line((left, at), (right, at), GRID)?;
         write(area, &number(tick), (left - 8, at), 12, SOFT, HPos::Right)?;
     }
     line((left, bottom), (right, bottom), SOFT)?;
@@ -310,17 +310,17 @@ fn place_names(
 pub fn error_against_cost(
     title: [&str; 2],
     names: [&str; 2],
-    points: &[Point],
+    points: &[PlotPoint],
 ) -> anyhow::Result<String> {
     let (left, right) = (MARGINS[0], WIDTH - MARGINS[1]);
     let (top, bottom) = (MARGINS[2], HEIGHT - MARGINS[3]);
     // The last bit of a coordinate: smaller errors cannot be distinguished.
-    let error = |point: &Point| point.error.max(1.0 / 65_536.0);
-    let x = Axis::around(points.iter().map(|p| p.cost), true, (left, right));
-    let mut y = Axis::around(points.iter().map(error), true, (bottom, top));
+    let error = |point: &PlotPoint| point.error.max(1.0 / 65_536.0);
+    let x = PlotAxis::around(points.iter().map(|p| p.cost), true, (left, right));
+    let mut y = PlotAxis::around(points.iter().map(error), true, (bottom, top));
     // Room for names above the mappers with the largest errors, which are many, with similar errors.
     y.to *= (y.to / y.from).powf(0.06);
-    let at = |point: &Point| (x.place(point.cost), y.place(error(point)));
+    let at = |point: &PlotPoint| (x.place(point.cost), y.place(error(point)));
     let mut svg = String::new();
     {
         let area =
@@ -382,7 +382,7 @@ pub fn error_against_cost(
 }
 
 /// Draws the legend: the families in the plot, the two marks, and the front.
-fn legend(area: &Area<'_>, points: &[Point]) -> anyhow::Result<()> {
+fn legend(area: &Drawing<'_>, points: &[PlotPoint]) -> anyhow::Result<()> {
     let (mut x, y) = (MARGINS[0], 74);
     for (i, (name, colour)) in FAMILIES.iter().enumerate() {
         if points.iter().any(|point| family(point.mapper) == i) {
@@ -430,14 +430,14 @@ pub fn lines(
     names: [&str; 2],
     least: f64,
     log_x: bool,
-    lines: &[Line],
+    lines: &[PlotLine],
 ) -> anyhow::Result<String> {
     let room = 118;
     let (left, right) = (MARGINS[0], WIDTH - MARGINS[1] - room);
     let (top, bottom) = (MARGINS[2] - 14, HEIGHT - MARGINS[3]);
     let all = || lines.iter().flat_map(|line| &line.at);
-    let x = Axis::around(all().map(|at| at.0), log_x, (left, right));
-    let y = Axis::around(all().map(|at| at.1.max(least)), true, (bottom, top));
+    let x = PlotAxis::around(all().map(|at| at.0), log_x, (left, right));
+    let y = PlotAxis::around(all().map(|at| at.1.max(least)), true, (bottom, top));
     let mut svg = String::new();
     {
         let area =
@@ -480,8 +480,8 @@ pub fn lines(
 mod tests {
     use super::*;
 
-    fn point(mapper: Mapper, cost: f64, error: f64) -> Point {
-        Point {
+    fn point(mapper: Mapper, cost: f64, error: f64) -> PlotPoint {
+        PlotPoint {
             mapper,
             cost,
             error,
@@ -490,7 +490,7 @@ mod tests {
     }
 
     #[test]
-    fn names_lie_over_no_other_name_and_no_point() {
+    fn a_name_overlaps_no_other_name_and_no_point() {
         let mut random = seeded::generator();
         let inside = [60, 60, 1000, 600];
         for _ in 0..20 {
@@ -515,14 +515,14 @@ mod tests {
     }
 
     #[test]
-    fn axes_have_a_few_round_ticks() {
+    fn an_axis_has_3_to_12_round_ticks() {
         for (from, to, log) in [
             (1.1, 30.0, true),
             (0.9, 4.0, true),
             (1e-5, 300.0, true),
             (0.0, 239.0, false),
         ] {
-            let axis = Axis {
+            let axis = PlotAxis {
                 from,
                 to,
                 log,
@@ -546,7 +546,7 @@ mod tests {
     }
 
     #[test]
-    fn the_plot_names_every_mapper_and_draws_the_front() {
+    fn the_plot_of_error_against_cost_names_every_mapper() {
         let all = Mapper::ALL.iter().zip(1..);
         let points: Vec<_> = all
             .map(|(named, i)| point(named.1, f64::from(i), 100.0 / f64::from(i)))
@@ -561,8 +561,8 @@ mod tests {
     }
 
     #[test]
-    fn lines_are_drawn_and_named() {
-        let line = |name: &str, scale: f64| Line {
+    fn the_plot_of_lines_names_every_line() {
+        let line = |name: &str, scale: f64| PlotLine {
             name: name.into(),
             at: (0..50)
                 .map(|i| (f64::from(i), scale * f64::from(i)))

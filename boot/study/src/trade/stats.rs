@@ -73,7 +73,7 @@ const OCTAVES: std::ops::Range<i32> = -20..9;
 
 /// A histogram of errors, so that the errors of many frames fit into memory.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Errors {
+pub struct ErrorHistogram {
     /// The number of errors in each class, the smallest errors first. Errors below all classes count in the
     /// first class.
     classes: Vec<u32>,
@@ -82,7 +82,7 @@ pub struct Errors {
     largest: f64,
 }
 
-impl Default for Errors {
+impl Default for ErrorHistogram {
     fn default() -> Self {
         Self {
             classes: vec![0; (OCTAVES.len() as i32 * CLASSES) as usize],
@@ -93,7 +93,7 @@ impl Default for Errors {
     }
 }
 
-impl Errors {
+impl ErrorHistogram {
     /// Adds an error.
     pub fn add(&mut self, error: f64) {
         let above = (error.log2() - f64::from(OCTAVES.start)) * f64::from(CLASSES);
@@ -156,7 +156,11 @@ impl Errors {
 /// # Panics
 /// If the frames have different numbers of pixels.
 pub fn psnr(a: &[[u8; 3]], b: &[[u8; 3]]) -> f64 {
-    assert_eq!(a.len(), b.len(), "one frame has more pixels");
+    assert_eq!(
+        a.len(),
+        b.len(),
+        "the frames have different numbers of pixels"
+    );
     let pairs = a.as_flattened().iter().zip(b.as_flattened());
     let squares: f64 = pairs.map(|(&a, &b)| f64::from(a.abs_diff(b)).powi(2)).sum();
     let parts = 3.0 * a.len() as f64;
@@ -187,7 +191,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn medians_are_in_the_middle() {
+    fn a_spread_has_the_median_the_least_and_the_most() {
         assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
         let spread = Spread::of(&[10.0, 9.0, 12.0, 10.0, 11.0]);
@@ -208,16 +212,16 @@ mod tests {
     }
 
     #[test]
-    fn percentiles_are_those_of_the_sorted_list() {
+    fn percentiles_equal_those_of_the_sorted_list_within_a_class() {
         let mut random = seeded::generator();
         for _ in 0..50 {
-            let mut errors = Errors::default();
+            let mut errors = ErrorHistogram::default();
             let count = random.usize(1..2000);
             let mut list: Vec<f64> = (0..count)
                 .map(|_| (random.f64() * 26.0 - 18.0).exp2())
                 .collect();
             // Two histograms, joined.
-            let mut second = Errors::default();
+            let mut second = ErrorHistogram::default();
             let half = random.usize(..=count);
             list[..half].iter().for_each(|&error| errors.add(error));
             list[half..].iter().for_each(|&error| second.add(error));
@@ -229,16 +233,19 @@ mod tests {
             assert!((errors.mean() / mean - 1.0).abs() < 1e-9);
             for share in [0.01, 0.5, 0.99, 1.0] {
                 let exact = list[((share * count as f64).ceil() as usize).max(1) - 1];
-                let told = errors.percentile(share);
+                let found = errors.percentile(share);
                 // Never too small, and at most one class too large.
-                assert!(told >= exact && told <= exact * 1.011, "{told} for {exact}");
+                assert!(
+                    found >= exact && found <= exact * 1.011,
+                    "{found} for {exact}"
+                );
             }
         }
     }
 
     #[test]
-    fn what_can_not_be_told_apart_is_not_lost() {
-        let mut errors = Errors::default();
+    fn errors_outside_all_classes_are_counted() {
+        let mut errors = ErrorHistogram::default();
         assert_eq!((errors.mean(), errors.percentile(0.99)), (0.0, 0.0));
         errors.add(0.0);
         assert_eq!((errors.largest(), errors.percentile(1.0)), (0.0, 0.0));
@@ -248,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn signal_to_noise_in_decibels() {
+    fn psnr_is_in_decibels() {
         let black = [[0; 3]; 4];
         assert_eq!(psnr(&black, &black), f64::INFINITY);
         assert_eq!(psnr(&black, &[[255; 3]; 4]), 0.0);
@@ -259,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn the_front_is_what_nothing_beats() {
+    fn the_pareto_front_has_the_points_that_no_point_beats() {
         let mut random = seeded::generator();
         for _ in 0..200 {
             // Only eight values, so that many points are equal in cost, in error or in both.

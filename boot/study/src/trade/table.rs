@@ -6,21 +6,21 @@ use texmap::{Mapper, Order};
 
 use super::accuracy::Accuracy;
 use super::clock;
-use super::cost::{Cost, Costs, Swept};
+use super::cost::{MapperCost, PixelCost, SweepPoint};
 use super::stats::Spread;
 
 /// A mapper's figures on one scene, or on all scenes.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct TableRow {
     /// The mapper.
     pub mapper: Mapper,
     /// The mapper's accuracy.
     pub accuracy: Accuracy,
     /// The mapper's cost in each of [`ORDERS`](super::cost::ORDERS).
-    pub costs: Vec<Costs>,
+    pub costs: Vec<MapperCost>,
 }
 
-impl Row {
+impl TableRow {
     /// Returns the name of the mapper.
     pub fn name(&self) -> String {
         self.mapper.to_string()
@@ -30,8 +30,8 @@ impl Row {
     ///
     /// # Panics
     /// If the row has no costs.
-    pub fn best(&self) -> &Costs {
-        let cost = |costs: &&Costs| costs.frame.time.median;
+    pub fn best(&self) -> &MapperCost {
+        let cost = |costs: &&MapperCost| costs.frame.time.median;
         let best = self.costs.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
         best.expect("there is an order")
     }
@@ -40,7 +40,7 @@ impl Row {
     ///
     /// # Panics
     /// If the order was not measured.
-    pub fn costs(&self, order: Order) -> &Costs {
+    pub fn costs(&self, order: Order) -> &MapperCost {
         let found = self.costs.iter().find(|costs| costs.order == order);
         found.expect("every order was measured")
     }
@@ -54,7 +54,7 @@ pub struct Table {
     /// A line about the scene.
     pub about: String,
     /// A row for each mapper.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TableRow>,
 }
 
 impl Table {
@@ -63,34 +63,34 @@ impl Table {
         let mut rows = Vec::new();
         let mappers = tables.first().map_or(&[][..], |table| &table.rows);
         for (i, first) in mappers.iter().enumerate() {
-            let same: Vec<&Row> = tables.iter().map(|table| &table.rows[i]).collect();
+            let same: Vec<&TableRow> = tables.iter().map(|table| &table.rows[i]).collect();
             let mut accuracy = first.accuracy.clone();
             same[1..]
                 .iter()
                 .for_each(|row| accuracy.extend(&row.accuracy));
-            let mean = |k: usize, part: fn(&Costs) -> Cost| {
-                let parts = |spread: fn(&Cost) -> Spread| {
+            let mean = |k: usize, part: fn(&MapperCost) -> PixelCost| {
+                let parts = |spread: fn(&PixelCost) -> Spread| {
                     let all: Vec<Spread> = same
                         .iter()
                         .map(|row| spread(&part(&row.costs[k])))
                         .collect();
                     Spread::mean(&all)
                 };
-                Cost {
+                PixelCost {
                     time: parts(|cost| cost.time),
                     to_bare: parts(|cost| cost.to_bare),
                     to_packed: parts(|cost| cost.to_packed),
                 }
             };
-            let costs = first.costs.iter().enumerate().map(|(k, costs)| Costs {
+            let costs = first.costs.iter().enumerate().map(|(k, costs)| MapperCost {
                 loops: mean(k, |costs| costs.loops),
                 frame: mean(k, |costs| costs.frame),
-                twin: costs
-                    .twin
-                    .map(|_| mean(k, |costs| costs.twin.unwrap_or(costs.loops))),
+                portable: costs
+                    .portable
+                    .map(|_| mean(k, |costs| costs.portable.unwrap_or(costs.loops))),
                 ..*costs
             });
-            rows.push(Row {
+            rows.push(TableRow {
                 mapper: first.mapper,
                 accuracy,
                 costs: costs.collect(),
@@ -130,10 +130,11 @@ impl Table {
                 percent(accuracy.other_share()),
                 decibels(accuracy.psnr),
             ];
-            let parts: [fn(&Costs) -> Cost; 2] = [|costs| costs.loops, |costs| costs.frame];
+            let parts: [fn(&MapperCost) -> PixelCost; 2] =
+                [|costs| costs.loops, |costs| costs.frame];
             for part in parts {
                 line.extend(row.costs.iter().map(|costs| {
-                    let Cost { time, to_bare, .. } = part(costs);
+                    let PixelCost { time, to_bare, .. } = part(costs);
                     format!(
                         "{:.2} ± {:.2} ({:.2})",
                         time.median,
@@ -143,10 +144,10 @@ impl Table {
                 }));
             }
             line.push(format!("{:.2}", row.best().frame.to_packed.median));
-            let twins = row.costs.iter().enumerate();
-            for (k, twin) in twins.filter_map(|(k, costs)| Some((k, costs.twin?))) {
+            let portables = row.costs.iter().enumerate();
+            for (k, portable) in portables.filter_map(|(k, costs)| Some((k, costs.portable?))) {
                 // The columns of the loops follow the six columns of the name and the accuracy.
-                line[6 + k] += &format!("; {:.2} without BMI2", twin.time.median);
+                line[6 + k] += &format!("; {:.2} without BMI2", portable.time.median);
             }
             cells.push(line);
         }
@@ -256,8 +257,8 @@ pub fn csv(tables: &[Table]) -> String {
                     }
                 }
                 text.push(',');
-                if let Some(twin) = costs.twin {
-                    let _ = write!(text, "{:.4}", twin.time.median);
+                if let Some(portable) = costs.portable {
+                    let _ = write!(text, "{:.4}", portable.time.median);
                 }
                 text.push('\n');
             }
@@ -267,10 +268,10 @@ pub fn csv(tables: &[Table]) -> String {
 }
 
 /// Returns the sweeps over span lengths and angles as CSV.
-pub fn sweep_csv(swept: &[Swept]) -> String {
+pub fn sweep_csv(sweep: &[SweepPoint]) -> String {
     let mut text = String::from("length,angle,mapper,order,unit,time,time_least,time_most");
     text += ",time_to_bare,time_to_packed\n";
-    for at in swept {
+    for at in sweep {
         let Spread {
             median,
             least,
@@ -303,7 +304,7 @@ fn field(text: &str) -> String {
 pub(super) mod tests {
     use super::*;
 
-    /// Returns a table with figures of no meaning.
+    /// Returns a table of made-up figures.
     pub fn made_up(scene: &str, scale: f64) -> Table {
         let mut rows = Vec::new();
         for (i, &(_, mapper, _)) in Mapper::ALL.iter().enumerate() {
@@ -317,19 +318,19 @@ pub(super) mod tests {
                     .errors
                     .add(errors.f64() * scale * 0.7f64.powi(i as i32));
             }
-            let cost = |time: f64| Cost {
+            let cost = |time: f64| PixelCost {
                 time: Spread::of(&[time, time * 1.1, time * 0.95]),
                 to_bare: Spread::of(&[time / 2.0]),
                 to_packed: Spread::of(&[time / 3.0]),
             };
-            let costs = super::super::cost::ORDERS.map(|order| Costs {
+            let costs = super::super::cost::ORDERS.map(|order| MapperCost {
                 mapper,
                 order,
                 loops: cost(1.0 + i as f64),
                 frame: cost(2.0 + i as f64 * scale),
-                twin: (i % 2 == 0).then(|| cost(7.0)),
+                portable: (i % 2 == 0).then(|| cost(7.0)),
             });
-            rows.push(Row {
+            rows.push(TableRow {
                 mapper,
                 accuracy,
                 costs: costs.to_vec(),
@@ -343,7 +344,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn csv_has_as_many_fields_in_every_line() {
+    fn every_line_of_the_csv_has_the_same_number_of_fields() {
         let tables = [made_up("a", 1.0), made_up("b,\"c\"", 2.0)];
         let text = csv(&tables);
         let mut lines = text.lines();
@@ -360,7 +361,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn markdown_has_as_many_cells_in_every_line() {
+    fn every_line_of_the_markdown_has_the_same_number_of_cells() {
         let table = made_up("a", 1.0);
         let text = markdown(&table.cells());
         let bars = |line: &str| line.matches('|').count();
@@ -371,7 +372,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn tables_together_have_all_errors_and_mean_costs() {
+    fn a_joined_table_has_all_errors_and_the_mean_costs() {
         let tables = [made_up("a", 1.0), made_up("b", 4.0)];
         let all = Table::all(&tables);
         for (i, row) in all.rows.iter().enumerate() {
@@ -388,7 +389,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn figures_have_the_digits_that_mean_something() {
+    fn figures_are_printed_with_their_significant_digits() {
         for (error, text) in [
             (0.0, "0"),
             (123.4, "123"),

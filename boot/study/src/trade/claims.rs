@@ -1,24 +1,24 @@
 //! The sources' claims, beside the measurements of this run.
 //!
-//! The texts are fixed; the figures are those of the run.
+//! The texts are fixed; the figures come from the run.
 
 use modex::HEIGHT;
 use scene::Pose;
 use scene::catalogue::Entry;
 use texmap::{Mapper, Order};
 
-use super::accuracy::{self, Accuracy, Jobs};
+use super::accuracy::{self, Accuracy, FrameJobs};
 use super::clock;
-use super::cost::{ANGLE, LENGTH, Swept};
+use super::cost::{LENGTH, LongSpans, SweepPoint};
 use super::stats::Spread;
-use super::subject::with_poses;
 use super::table::{Table, decibels, percent, texels};
+use super::workload::with_poses;
 
-/// A claim and its measurement.
+/// A source's claim and its measurement.
 #[derive(Clone, Debug)]
-pub struct Trial {
+pub struct Claim {
     /// The source of the claim.
-    pub place: &'static str,
+    pub source: &'static str,
     /// The claim.
     pub claimed: &'static str,
     /// The measured values.
@@ -27,38 +27,7 @@ pub struct Trial {
     pub why: &'static str,
 }
 
-/// The times of drawing long spans, by the mapper's name.
-struct Loops<'a>(&'a [Swept]);
-
-impl Loops<'_> {
-    fn time(&self, mapper: &str, order: Order) -> Option<f64> {
-        let of = |swept: &&Swept| {
-            swept.length == LENGTH
-                && swept.angle == ANGLE
-                && swept.order == order
-                && swept.mapper.to_string() == mapper
-        };
-        self.0.iter().find(of).map(|swept| swept.cost.time.median)
-    }
-
-    fn ratio(&self, slow: (&str, Order), fast: (&str, Order)) -> String {
-        match (self.time(slow.0, slow.1), self.time(fast.0, fast.1)) {
-            (Some(slow), Some(fast)) => format!("{:.2} times", slow / fast),
-            _ => NOT_MEASURED.into(),
-        }
-    }
-
-    /// Returns the fastest affine column loop, and its time.
-    fn best(&self, order: Order) -> Option<(Mapper, f64)> {
-        let affine = Mapper::ALL
-            .iter()
-            .filter(|(_, mapper, _)| matches!(mapper, Mapper::Affine(_)));
-        let timed = affine.filter_map(|(name, mapper, _)| Some((*mapper, self.time(name, order)?)));
-        timed.min_by(|a, b| a.1.total_cmp(&b.1))
-    }
-}
-
-const NOT_MEASURED: &str = "not measured: its mappers were left out";
+const NOT_MEASURED: &str = "not measured, because this run left the mappers out";
 
 /// Angles between the screen's axes and the line of constant depth, in tenths of a degree.
 const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
@@ -67,14 +36,14 @@ const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
 pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
     let free = Mapper::parse("free")?;
     let entry = Entry::parse("grazing-16")?;
-    let mut jobs = Box::new(Jobs::new());
+    let mut jobs = Box::new(FrameJobs::new());
     let tilts = TILTS.map(|tenths| {
         let pose = Pose {
             roll: ((u64::from(tenths) << 32) / 3600) as u32,
             ..entry.pose(0)
         };
-        let accuracy = with_poses(entry, &[pose], |subject| {
-            accuracy::measure(subject, free, &mut jobs)
+        let accuracy = with_poses(entry, &[pose], |workload| {
+            accuracy::measure(workload, free, &mut jobs)
         });
         (f64::from(tenths) / 10.0, accuracy)
     });
@@ -82,31 +51,42 @@ pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
 }
 
 /// Returns every claim with its measurement.
-pub fn trials(
+pub fn all(
     tables: &[Table],
-    swept: &[Swept],
+    sweep: &[SweepPoint],
     unrolling: Spread,
     tilts: Option<&[(f64, Accuracy)]>,
-) -> Vec<Trial> {
+) -> Vec<Claim> {
     use Order::{Planes, Polygons};
-    let loops = Loops(swept);
+    let spans = LongSpans(sweep);
     let unit = clock::UNIT;
-    let time = |mapper, order| match loops.time(mapper, order) {
+    let time = |mapper, order| match spans.time(mapper, order) {
         Some(time) => format!("{time:.2}"),
         None => "?".into(),
     };
-    let best = match loops.best(Planes) {
-        Some((mapper, best)) => match loops.time("row-steps", Polygons) {
-            Some(rows) => format!("; to `{mapper}`, plane by plane, {:.2} times", rows / best),
-            None => String::new(),
-        },
-        None => String::new(),
+    let ratio = |slow: (&str, Order), fast: (&str, Order)| match (
+        spans.time(slow.0, slow.1),
+        spans.time(fast.0, fast.1),
+    ) {
+        (Some(slow), Some(fast)) => format!("{:.2} times", slow / fast),
+        _ => NOT_MEASURED.into(),
+    };
+    let best = match (
+        spans.time("row-steps", Polygons),
+        spans.fastest_affine(Planes),
+    ) {
+        (Some(rows), Some(best)) => format!(
+            "; to `{}`, plane by plane, {:.2} times",
+            best.mapper,
+            rows / best.cost.time.median
+        ),
+        _ => String::new(),
     };
     let two_steps = match (
-        loops.time("two-steps", Polygons),
-        loops.time("packed", Polygons),
-        loops.time("two-steps", Planes),
-        loops.time("packed", Planes),
+        spans.time("two-steps", Polygons),
+        spans.time("packed", Polygons),
+        spans.time("two-steps", Planes),
+        spans.time("packed", Planes),
     ) {
         (Some(a), Some(b), Some(c), Some(d)) => {
             format!("{:+.2} {unit} by polygons, {:+.2} by planes", a - b, c - d)
@@ -114,68 +94,67 @@ pub fn trials(
         _ => NOT_MEASURED.into(),
     };
     vec![
-        Trial {
-            place: "57, listing 57.2",
+        Claim {
+            source: "chapter 57, listing 57.2",
             claimed: "more than twice as fast as listing 57.1",
-            measured: loops.ratio(("row-multiply", Polygons), ("row-steps", Polygons)),
-            why: "A multiplication was 13 to 42 cycles and is 3 now, hidden behind other pixels'; a \
-                  chain of steps waits for itself. On a card both choose the plane anew for every \
-                  pixel.",
+            measured: ratio(("row-multiply", Polygons), ("row-steps", Polygons)),
+            why: "A multiplication cost 13 to 42 cycles; now it costs 3, and overlaps with other \
+                  pixels. Steps form a chain in which each waits for the one before. On a VGA both \
+                  listings select the plane for every pixel.",
         },
-        Trial {
-            place: "58, of listing 58.1",
+        Claim {
+            source: "chapter 58, on listing 58.1",
             claimed: "nearly 10 % from unrolling",
             measured: format!(
                 "{:.1} % from unrolling a loop of shifts and masks eight times",
                 100.0 * (1.0 - 1.0 / unrolling.median)
             ),
-            why: "A jump that is foreseen costs next to nothing, so that unrolling gains little, or \
-                  loses by its own bookkeeping.",
+            why: "A predicted branch costs almost nothing, so unrolling gains little, or loses to its \
+                  own bookkeeping.",
         },
-        Trial {
-            place: "58, listing 58.2",
+        Claim {
+            source: "chapter 58, listing 58.2",
             claimed: "columns 2 to 4 times as fast as rows",
             measured: format!(
                 "{} by polygons, {} with both by planes",
-                loops.ratio(("row-steps", Polygons), ("two-carries", Polygons)),
-                loops.ratio(("row-steps", Planes), ("two-carries", Planes)),
+                ratio(("row-steps", Polygons), ("two-carries", Polygons)),
+                ratio(("row-steps", Planes), ("two-carries", Planes)),
             ),
-            why: "In RAM there is no OUT, which was most of the gain; down a column every store \
-                  meets another line of the cache. On a card the port writes count: a column \
-                  takes one, a row one a pixel.",
+            why: "RAM needs no OUT, whose cost was most of the gain, and each store down a column \
+                  is in another cache line. On a VGA the port writes count: a column needs one, a row \
+                  one for each pixel.",
         },
-        Trial {
-            place: "58, at the end",
-            claimed: "5 to 10 times in all",
+        Claim {
+            source: "chapter 58, at the end",
+            claimed: "5 to 10 times as fast in all",
             measured: format!(
                 "{} from `row-steps` to `packed`, by polygons{best}",
-                loops.ratio(("row-steps", Polygons), ("packed", Polygons)),
+                ratio(("row-steps", Polygons), ("packed", Polygons)),
             ),
-            why: "The order of the planes now gains what the loop gained then.",
+            why: "Drawing plane by plane now gains what the loop gained then.",
         },
-        Trial {
-            place: "58, of John Miles's loop",
+        Claim {
+            source: "chapter 58, on John Miles's loop",
             claimed: "a table of two steps costs half a cycle to one more than the branch",
             measured: two_steps,
-            why: "Carries come as regularly as steps add up, which today's predictors learn: then \
-                  the branch is free, as it nearly was. Where they do not learn it, a wrong guess \
-                  costs some 15 cycles, and the table none.",
+            why: "Carries follow a regular pattern, which today's branch predictors learn: then the \
+                  branch is free. Where they do not learn the pattern, a misprediction costs about 15 \
+                  cycles, and the table none.",
         },
-        Trial {
-            place: "58, listing 58.3",
+        Claim {
+            source: "chapter 58, listing 58.3",
             claimed: "packed fractions: from 22 cycles to 10, and 9 without a segment prefix",
             measured: format!(
                 "{} from `two-carries` to `packed` ({} {unit}) by polygons, {} ({}) by planes",
-                loops.ratio(("two-carries", Polygons), ("packed", Polygons)),
+                ratio(("two-carries", Polygons), ("packed", Polygons)),
                 time("packed", Polygons),
-                loops.ratio(("two-carries", Planes), ("packed", Planes)),
+                ratio(("two-carries", Planes), ("packed", Planes)),
                 time("packed", Planes),
             ),
-            why: "64-bit code has no segments to swap. Two branches that are not foreseen become \
-                  one.",
+            why: "64-bit code has no segments to swap. One unpredicted branch replaces two.",
         },
-        Trial {
-            place: "Free-direction mapping",
+        Claim {
+            source: "Free-direction mapping",
             claimed: "looks worst for very small rotations, Hc or Vc near 0",
             measured: match tilts {
                 None => NOT_MEASURED.into(),
@@ -186,17 +165,18 @@ pub fn trials(
                     format!("other texels at {}", each.collect::<Vec<_>>().join(", "))
                 }
             },
-            why: "The share of wrong texels does not tell: it is the same at any slope but 0 and 45 \
-                  degrees, where the lines meet the pixels' centres. At a small slope a line keeps \
-                  to one row for long and then jumps, so that the same error shows as long seams.",
+            why: "The share of wrong texels does not show it: it is about the same at every slope \
+                  except 0 and 45 degrees, where the lines meet the pixels' centres. At a small slope \
+                  a line stays in one row for long and then jumps, so the same error shows as long \
+                  seams.",
         },
-        Trial {
-            place: "Subdivision",
+        Claim {
+            source: "Subdivision",
             claimed: "the quadratic looks better than the linear with fewer pieces",
             measured: quadratic(tables),
-            why: "Half as many pieces take as many quotients. Error falls with the cube of a \
-                  piece's length in place of its square, while depth changes little in a piece; \
-                  near a horizon it does not.",
+            why: "Half as many pieces need as many quotients. The error falls with the cube of a \
+                  piece's length instead of its square as long as the depth changes little in a piece, \
+                  which is not so near a horizon.",
         },
     ]
 }
@@ -212,15 +192,15 @@ fn quadratic(tables: &[Table]) -> String {
         if !["tilted", "grazing-16", "grazing-4096", "cube"].contains(&&table.scene[..]) {
             continue;
         }
-        let told = |accuracy: &Accuracy| {
+        let figures = |accuracy: &Accuracy| {
             let mean = texels(accuracy.errors.mean());
             format!("{mean} ({})", decibels(accuracy.psnr))
         };
         parts.push(format!(
             "{}: {} to {}",
             table.scene,
-            told(&quadratic.accuracy),
-            told(&linear.accuracy)
+            figures(&quadratic.accuracy),
+            figures(&linear.accuracy)
         ));
     }
     match parts.is_empty() {
@@ -233,18 +213,18 @@ fn quadratic(tables: &[Table]) -> String {
 }
 
 /// Returns the cells of the table, the header first.
-pub fn cells(trials: &[Trial]) -> Vec<Vec<String>> {
-    let head = ["chapter", "claimed", "measured here", "why"].map(String::from);
+pub fn cells(claims: &[Claim]) -> Vec<Vec<String>> {
+    let head = ["source", "claim", "measured here", "reason"].map(String::from);
     let mut cells = vec![head.to_vec()];
-    cells.extend(trials.iter().map(|trial| {
-        let Trial {
-            place,
+    cells.extend(claims.iter().map(|claim| {
+        let Claim {
+            source,
             claimed,
             measured,
             why,
-        } = trial;
+        } = claim;
         vec![
-            (*place).into(),
+            (*source).into(),
             (*claimed).into(),
             measured.clone(),
             why.split_whitespace().collect::<Vec<_>>().join(" "),
@@ -259,17 +239,17 @@ const _: () = assert!(LENGTH as usize == HEIGHT);
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trade::cost::Cost;
+    use crate::trade::cost::{ANGLE, PixelCost};
     use crate::trade::table::tests::made_up;
 
-    fn swept(mapper: &str, order: Order, time: f64) -> Swept {
+    fn sweep(mapper: &str, order: Order, time: f64) -> SweepPoint {
         let one = Spread::of(&[1.0]);
-        Swept {
+        SweepPoint {
             length: LENGTH,
             angle: ANGLE,
             mapper: Mapper::parse(mapper).unwrap(),
             order,
-            cost: Cost {
+            cost: PixelCost {
                 time: Spread::of(&[time]),
                 to_bare: one,
                 to_packed: one,
@@ -278,8 +258,8 @@ mod tests {
     }
 
     #[test]
-    fn trials_tell_the_figures_of_the_run() {
-        let mut all = Vec::new();
+    fn claims_show_the_figures_of_the_run() {
+        let mut points = Vec::new();
         for (order, scale) in [(Order::Polygons, 1.0), (Order::Planes, 0.5)] {
             for (mapper, time) in [
                 ("row-multiply", 9.0),
@@ -289,26 +269,26 @@ mod tests {
                 ("two-steps", 2.0),
                 ("extract", 1.0),
             ] {
-                all.push(swept(mapper, order, time * scale));
+                points.push(sweep(mapper, order, time * scale));
             }
         }
         let tables = [made_up("tilted", 1.0)];
-        let trials = trials(&tables, &all, Spread::of(&[1.25]), None);
-        let measured: Vec<_> = trials.iter().map(|trial| &trial.measured[..]).collect();
+        let claims = all(&tables, &points, Spread::of(&[1.25]), None);
+        let measured: Vec<_> = claims.iter().map(|claim| &claim.measured[..]).collect();
         assert_eq!(measured[0], "1.50 times");
         assert!(measured[1].starts_with("20.0 %"));
         assert!(measured[3].ends_with("to `extract`, plane by plane, 12.00 times"));
         assert!(measured[4].starts_with("-1.00") && measured[4].contains("-0.50"));
         assert!(measured[6].starts_with("not measured"));
         assert!(measured[7].contains("tilted: "));
-        let cells = cells(&trials);
+        let cells = cells(&claims);
         assert!(cells.iter().all(|line| line.len() == 4));
     }
 
     #[test]
-    fn what_was_left_out_is_said_to_be() {
-        let trials = trials(&[], &[], Spread::of(&[1.0]), None);
-        let missing = trials
+    fn a_claim_without_its_mappers_says_not_measured() {
+        let claims = all(&[], &[], Spread::of(&[1.0]), None);
+        let missing = claims
             .iter()
             .filter(|t| t.measured.contains("not measured"));
         assert!(missing.count() >= 6);

@@ -16,8 +16,8 @@ use scene::catalogue::Entry;
 use vga::Vga;
 
 use crate::dump::Dump;
-use crate::look::Look;
-use crate::screen::Screen;
+use crate::options::FrameOptions;
+use crate::rgb::RgbImage;
 use vga::widen;
 
 /// Returns empty memory for the demo. It is built in place, because its size of about 4 MiB exceeds a
@@ -26,45 +26,45 @@ pub fn memory() -> InPlace<DemoMemory> {
     in_place::boxed!(DemoMemory)
 }
 
-/// A VGA with the demo running on it.
-pub trait Card {
+/// The interface of QEMU's VGA and of the emulated VGA, with the demo running.
+pub trait Backend {
     /// Carries out a command and returns the lines of its answer without the closing `ok`.
     ///
     /// # Errors
-    /// The program's `error` line, or the reason why no answer came.
-    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>>;
+    /// The demo's `error` line, or the reason why no answer came.
+    fn send(&mut self, command: Command) -> anyhow::Result<Vec<String>>;
 
     /// Returns the contents of video memory, with the palette.
     ///
     /// # Errors
-    /// As [`Card::ask`], and an answer that is not a valid dump.
+    /// As [`Backend::ask`], and an answer that is not a valid dump.
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump>;
 
     /// Returns the image that the monitor shows.
     ///
     /// # Errors
     /// The reason why no image can be captured.
-    fn screen(&mut self) -> anyhow::Result<Screen>;
+    fn screen(&mut self) -> anyhow::Result<RgbImage>;
 
     /// Holds and resets the demo, and shows `frames` one after the other with the default options.
     ///
     /// # Errors
-    /// As [`Card::ask`].
+    /// As [`Backend::ask`].
     fn show(&mut self, frames: &[FrameName]) -> anyhow::Result<()> {
-        self.show_as(&Look::default(), frames)
+        self.show_with(&FrameOptions::default(), frames)
     }
 
-    /// Does the same as [`Card::show`], with the options in `look`.
+    /// Does the same as [`Backend::show`], with `options`.
     ///
     /// # Errors
-    /// As [`Card::ask`].
-    fn show_as(&mut self, look: &Look, frames: &[FrameName]) -> anyhow::Result<()> {
-        self.ask(Command::Hold)?;
-        for command in look.commands() {
-            self.ask(command)?;
+    /// As [`Backend::ask`].
+    fn show_with(&mut self, options: &FrameOptions, frames: &[FrameName]) -> anyhow::Result<()> {
+        self.send(Command::Hold)?;
+        for command in options.commands() {
+            self.send(command)?;
         }
         for &frame in frames {
-            self.ask(Command::Show(frame))?;
+            self.send(Command::Show(frame))?;
         }
         Ok(())
     }
@@ -72,13 +72,13 @@ pub trait Card {
 
 /// The demo on the emulated VGA.
 #[derive(Debug)]
-pub struct Emulated<'a> {
+pub struct EmulatedDemo<'a> {
     demo: Demo<'a, Vga>,
     /// The checksum of the model file, if one is loaded.
     model_file: Option<u32>,
 }
 
-impl<'a> Emulated<'a> {
+impl<'a> EmulatedDemo<'a> {
     /// Returns the demo, held, on an emulated VGA that was just switched on.
     ///
     /// # Errors
@@ -87,10 +87,10 @@ impl<'a> Emulated<'a> {
         Self::with(memory, None)
     }
 
-    /// Returns the same as [`Emulated::new`], with the model in `model_file` as the default scene.
+    /// Returns the same as [`EmulatedDemo::new`], with the model in `model_file` as the default scene.
     ///
     /// # Errors
-    /// As [`Emulated::new`].
+    /// As [`EmulatedDemo::new`].
     pub fn with(
         memory: &'a mut DemoMemory,
         model_file: Option<&ModelFile<'a>>,
@@ -99,7 +99,7 @@ impl<'a> Emulated<'a> {
             demo: Demo::new(memory, Vga::new(), model_file)?,
             model_file: model_file.map(ModelFile::checksum),
         };
-        this.ask(Command::Hold)?;
+        this.send(Command::Hold)?;
         Ok(this)
     }
 
@@ -109,8 +109,8 @@ impl<'a> Emulated<'a> {
     }
 }
 
-impl Card for Emulated<'_> {
-    fn ask(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
+impl Backend for EmulatedDemo<'_> {
+    fn send(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
         let mut answer = Vec::new();
         let request = self
             .demo
@@ -118,38 +118,41 @@ impl Card for Emulated<'_> {
         let faults = self.demo.bus().take_faults();
         if let Some(fault) = faults.first() {
             let count = faults.len();
-            bail!("the emulated card finds {count} accesses at fault, the first: {fault}");
+            bail!("'{command}': the emulated VGA found {count} faults; the first: {fault}");
         }
         if let Some(request) = request {
-            bail!("the emulated card has no machine that could '{request:?}'");
+            bail!("'{command}': the emulated VGA has no machine to carry out {request:?}");
         }
         match answer.pop() {
             Some(last) if last == format!("{OK} {command}") => Ok(answer),
             Some(error) => {
                 let error = error.strip_prefix(ERROR).unwrap_or(&error);
-                Err(anyhow!("'{command}' is refused:{error}"))
+                Err(anyhow!("'{command}': refused:{error}"))
             }
-            None => Err(anyhow!("'{command}' was not answered")),
+            None => Err(anyhow!("'{command}': no answer")),
         }
     }
 
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
-        // The program is asked only for the header's contents: which frame this is, and how it was drawn.
-        let state = self.ask(Command::State)?;
-        let said = |what| {
+        // The program answers only for the header: which frame this is, and how it was drawn.
+        let state = self.send(Command::State)?;
+        let value = |label| {
             let mut lines = state.iter();
-            let said = lines.find_map(|line| line.strip_prefix(what)?.strip_prefix(' '));
-            said.with_context(|| format!("the state has no line '{what}'"))
+            let value = lines.find_map(|line| line.strip_prefix(label)?.strip_prefix(' '));
+            value.with_context(|| format!("the state has no line '{label}'"))
         };
-        let words = |what| Ok::<_, anyhow::Error>(Some(said(what)?).filter(|said| *said != "none"));
-        let scene = said("scene")?;
-        let mapper =
-            words("drawn")?.map(|name| Word::new(name).context("a mapper's name is a word"));
-        let frame = words("frame")?.map(|name| {
-            FrameName::parse(name.split(' ')).with_context(|| format!("'{name}' is no frame"))
+        let optional =
+            |label| Ok::<_, anyhow::Error>(Some(value(label)?).filter(|value| *value != "none"));
+        let scene = value("scene")?;
+        let mapper = optional("drawn")?.map(|name| {
+            Word::new(name).with_context(|| format!("'{name}' is not a mapper's name"))
         });
-        let motion = words("motion")?.map(|parts| {
-            Motion::parse(parts.split(' ')).with_context(|| format!("'{parts}' is no motion"))
+        let frame = optional("frame")?.map(|name| {
+            FrameName::parse(name.split(' '))
+                .with_context(|| format!("'{name}' is not a frame's name"))
+        });
+        let motion = optional("motion")?.map(|parts| {
+            Motion::parse(parts.split(' ')).with_context(|| format!("'{parts}' is not a motion"))
         });
         let vga = self.demo.bus();
         let page = vga.page().map_err(|fault| anyhow!("{fault}"))?;
@@ -176,11 +179,11 @@ impl Card for Emulated<'_> {
         })
     }
 
-    fn screen(&mut self) -> anyhow::Result<Screen> {
+    fn screen(&mut self) -> anyhow::Result<RgbImage> {
         let vga = self.demo.bus();
         let frame = vga.scan_out().map_err(|fault| anyhow!("{fault}"))?;
         let wide = |colour: [u8; 3]| colour.map(widen);
-        Ok(Screen {
+        Ok(RgbImage {
             width: frame.width,
             height: frame.height,
             pixels: frame.dots.into_iter().map(wide).collect(),
@@ -194,18 +197,18 @@ mod tests {
 
     /// Compares two ways to a dump: the kernel's, through the VGA's ports, and the inspection from outside.
     #[test]
-    fn what_the_program_reads_back_is_what_the_card_holds() {
+    fn a_dump_through_the_ports_equals_a_dump_from_outside() {
         let mut memory = memory();
-        let mut card = Emulated::new(&mut memory).unwrap();
+        let mut demo = EmulatedDemo::new(&mut memory).unwrap();
         for frames in [&[][..], &[FrameName::Number(0)], &[FrameName::Number(7); 3]] {
-            card.show(frames).unwrap();
+            demo.show(frames).unwrap();
             for content in [Content::Page, Content::Memory] {
-                let seen = card.dump(content).unwrap();
-                let told = card.ask(Command::Dump(content)).unwrap();
-                assert_eq!(told, seen.lines());
-                assert_eq!(Dump::from_lines(&told).unwrap(), seen);
+                let seen = demo.dump(content).unwrap();
+                let sent = demo.send(Command::Dump(content)).unwrap();
+                assert_eq!(sent, seen.lines());
+                assert_eq!(Dump::from_lines(&sent).unwrap(), seen);
                 assert_eq!(
-                    card.ask(Command::Checksums(content)).unwrap(),
+                    demo.send(Command::Checksums(content)).unwrap(),
                     seen.checksums()
                 );
             }
@@ -213,20 +216,20 @@ mod tests {
     }
 
     #[test]
-    fn a_refused_command_says_why() {
+    fn a_refused_command_has_the_reason_in_its_error() {
         let mut memory = memory();
-        let mut card = Emulated::new(&mut memory).unwrap();
+        let mut demo = EmulatedDemo::new(&mut memory).unwrap();
         let far = FrameName::Pose {
             yaw: 0,
             pitch: 0,
             roll: 0,
             distance: u32::MAX,
         };
-        let error = card.show(&[far]).unwrap_err().to_string();
+        let error = demo.show(&[far]).unwrap_err().to_string();
         assert!(
             error.ends_with("is out of range; use 0 to 00800000"),
             "{error}"
         );
-        assert!(card.ask(Command::Leave).is_err());
+        assert!(demo.send(Command::Leave).is_err());
     }
 }

@@ -1,4 +1,4 @@
-//! The subjects that mappers are measured on: scenes at several poses, and random polygons.
+//! The workloads that mappers are measured on: scenes at several poses, and random polygons.
 
 use render::{RenderMemory, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
@@ -16,14 +16,14 @@ pub const TICKS: [u32; 4] = [0, 61, 122, 183];
 
 /// A face that owns its polygon.
 #[derive(Clone, Debug)]
-pub struct Owned {
+pub struct OwnedFace {
     polygon: Vec<Vertex>,
     texture: u16,
     anchors: [Anchor; 3],
     focal_length: i32,
 }
 
-impl Owned {
+impl OwnedFace {
     fn new(face: &Face<'_>) -> Self {
         Self {
             polygon: face.polygon.to_vec(),
@@ -54,15 +54,15 @@ impl Owned {
     }
 }
 
-/// A scene to measure on.
+/// A scene at several poses, projected, with its textures lit: what a mapper is measured on.
 #[derive(Debug)]
-pub struct Subject<'a> {
+pub struct Workload<'a> {
     /// The scene's name.
     pub name: &'static str,
     /// A line about the scene.
     pub about: String,
     /// The faces of each frame.
-    pub frames: Vec<Vec<Owned>>,
+    pub frames: Vec<Vec<OwnedFace>>,
     /// The textures of the faces, lit.
     pub textures: Vec<Texture<'a>>,
     /// The DAC's colours, with 8 bits a component.
@@ -71,7 +71,7 @@ pub struct Subject<'a> {
     pub background: [u8; modex::HEIGHT],
 }
 
-impl<'a> Subject<'a> {
+impl<'a> Workload<'a> {
     fn new(
         name: &'static str,
         about: String,
@@ -83,7 +83,7 @@ impl<'a> Subject<'a> {
             let mut faces = Vec::new();
             stage
                 .at(pose)
-                .faces(|_, face| faces.extend(face.as_ref().map(Owned::new)));
+                .faces(|_, face| faces.extend(face.as_ref().map(OwnedFace::new)));
             frames.push(faces);
         }
         let stage: &'a SceneRenderer<'_> = stage;
@@ -109,7 +109,7 @@ impl<'a> Subject<'a> {
 /// under every mapper.
 const NOT_MEASURED: [&str; 3] = ["knot", "corridor", "moire"];
 
-/// Returns the names of all subjects.
+/// Returns the names of all workloads.
 pub fn names() -> impl Iterator<Item = &'static str> {
     let names = CATALOGUE.iter().map(|entry| entry.name);
     names
@@ -117,36 +117,40 @@ pub fn names() -> impl Iterator<Item = &'static str> {
         .chain([RANDOM])
 }
 
-/// Makes the subject of a name, and passes it to `look`. `seed` is the random scene's.
+/// Makes the workload of a name, and passes it to `measure`. `seed` is the random scene's.
 ///
 /// # Panics
 /// If no scene has the name.
-pub fn with<T>(name: &str, seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
+pub fn with<T>(name: &str, seed: u64, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
     if name == RANDOM {
-        return with_random(seed, look);
+        return with_random(seed, measure);
     }
     let entry = Entry::parse(name).expect("the scene was looked up before");
-    with_entry(entry, look)
+    with_entry(entry, measure)
 }
 
-/// Makes a subject of a scene at [`TICKS`], and passes it to `look`.
-pub fn with_entry<T>(entry: &Entry<'_>, look: impl FnOnce(&Subject<'_>) -> T) -> T {
-    with_poses(entry, &TICKS.map(|tick| entry.pose(tick)), look)
+/// Makes a workload of a scene at [`TICKS`], and passes it to `measure`.
+pub fn with_entry<T>(entry: &Entry<'_>, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
+    with_poses(entry, &TICKS.map(|tick| entry.pose(tick)), measure)
 }
 
-/// Makes a subject of a scene at some poses, and passes it to `look`.
-pub fn with_poses<T>(entry: &Entry<'_>, poses: &[Pose], look: impl FnOnce(&Subject<'_>) -> T) -> T {
+/// Makes a workload of a scene at some poses, and passes it to `measure`.
+pub fn with_poses<T>(
+    entry: &Entry<'_>,
+    poses: &[Pose],
+    measure: impl FnOnce(&Workload<'_>) -> T,
+) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = in_place::boxed!(RenderMemory);
     let textures = entry.paint(&mut texels);
     let mut stage = SceneRenderer::new(&mut storage, entry.scene(&textures));
     let about = entry.about.to_string();
-    look(&Subject::new(entry.name, about, &mut stage, poses))
+    measure(&Workload::new(entry.name, about, &mut stage, poses))
 }
 
-/// Makes the random subject, with the colours and the texture of the scene `tilted`, and passes it to
-/// `look`.
-fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
+/// Makes the random workload, with the colours and the texture of the scene `tilted`, and passes it to
+/// `measure`.
+fn with_random<T>(seed: u64, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let mut storage = in_place::boxed!(RenderMemory);
     let entry = Entry::parse("tilted").expect("it is in the catalogue");
@@ -171,7 +175,7 @@ fn with_random<T>(seed: u64, look: impl FnOnce(&Subject<'_>) -> T) -> T {
     };
     let about = format!("{POLYGONS} parallelograms at random, seed {seed}");
     let mut stage = SceneRenderer::new(&mut storage, scene);
-    look(&Subject::new(RANDOM, about, &mut stage, &[pose]))
+    measure(&Workload::new(RANDOM, about, &mut stage, &[pose]))
 }
 
 /// Returns parallelograms that face the eye, from near to far, each with the whole texture.
@@ -238,11 +242,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_subject_has_faces_and_repeats() {
+    fn every_workload_has_faces_and_is_the_same_each_time() {
         for name in names() {
-            let faces = |subject: &Subject<'_>| {
-                assert_eq!(subject.name, name);
-                let faces = subject.frames.iter().flatten();
+            let faces = |workload: &Workload<'_>| {
+                assert_eq!(workload.name, name);
+                let faces = workload.frames.iter().flatten();
                 faces.map(|face| face.polygon.clone()).collect::<Vec<_>>()
             };
             let once = with(name, 7, faces);
@@ -252,10 +256,10 @@ mod tests {
     }
 
     #[test]
-    fn random_polygons_look_at_the_viewer_and_depend_on_the_seed() {
+    fn random_polygons_face_the_viewer_and_depend_on_the_seed() {
         let polygons = |seed| {
-            with(RANDOM, seed, |subject| {
-                let faces = &subject.frames[0];
+            with(RANDOM, seed, |workload| {
+                let faces = &workload.frames[0];
                 // A few are off the screen, but none is lost because it faces away.
                 assert!(faces.len() > POLYGONS * 9 / 10, "{}", faces.len());
                 faces
