@@ -46,7 +46,7 @@ use crate::indexed::Indexed;
 use crate::look::{Look, Named};
 use crate::report::Report;
 use crate::screen::Screen;
-use system::Step;
+use system::Progress;
 use system::quote::{printable, quoted};
 use system::write_atomically;
 
@@ -467,7 +467,7 @@ pub fn bless<C: Card>(
     }
     let mut machine = boot()?;
     let mut disagree = Findings::default();
-    let mut step = Step::counting("asking QEMU", changes.len() as u64);
+    let mut step = Progress::counting("asking QEMU", changes.len() as u64);
     for (done, (golden, _)) in (1..).zip(&changes) {
         disagree.check_cards(golden, &mut emulated, &mut machine, Transfer::Bytes)?;
         step.at(done);

@@ -12,7 +12,7 @@ use protocol::{Command, Content, FrameName, Motion};
 
 use crate::card::Card;
 use crate::look::Look;
-use system::Step;
+use system::Progress;
 use system::{Interrupted, interrupted, write_atomically};
 
 /// Which frames to write, how much of video memory, and where to.
@@ -137,7 +137,7 @@ impl Frames {
         let motion = self.motion();
         let (count, frames) = self.frames();
         let what = format_args!("dumping into {}", self.out.display());
-        let mut step = Step::counting(what, count);
+        let mut step = Progress::counting(what, count);
         for (done, frame) in (1..).zip(frames) {
             if interrupted() {
                 return Err(Interrupted.into());

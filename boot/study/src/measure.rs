@@ -16,7 +16,7 @@ use texmap::{Mapper, Order};
 
 use qemu::Machine;
 use setup::{Options, Ready};
-use system::Step;
+use system::Progress;
 
 mod accesses;
 
@@ -257,7 +257,7 @@ pub fn run(config: &Config) -> anyhow::Result<Measured> {
     let mut memories = Memories::default();
     let mut emulated = Emulated::new(&mut memories);
     let all = config.cpus.len() * config.mappers.len() * Order::ALL.len() * 2;
-    let mut step = Step::counting("measuring in QEMU", all as u64);
+    let mut step = Progress::counting("measuring in QEMU", all as u64);
     let mut done = 0..;
     let mut tick = || step.at(done.next().unwrap_or(0));
     let mut cpus = Vec::new();
