@@ -89,7 +89,7 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
     let mut seen = Vec::new();
     let nearest = depth::nearest(stage, pose);
     stage.polygons(pose, |number, drawn| {
-        let drawn = drawn.expect("nothing legal is dropped");
+        let drawn = drawn.expect("no legal face is dropped");
         seen.push((number, drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });
     for (number, polygon, surface, anchors) in seen {
@@ -159,7 +159,7 @@ fn compare_coverage(
 }
 
 #[test]
-fn every_golden_is_what_the_oracle_draws() {
+fn the_oracle_draws_every_golden() {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = CATALOGUE[0].paint(&mut texels);
     let mut storage = in_place::boxed!(Storage);

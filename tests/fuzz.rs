@@ -1,8 +1,8 @@
-//! Files in any state: whatever a user's model or an image's ramdisk contains, it is refused with a message
-//! or drawn, and nothing panics.
+//! Damaged files: every model of a user and every ramdisk of an image is either drawn or refused with a
+//! message, and no file causes a panic.
 //!
 //! Good files are changed at random, so that they pass the first checks and reach the later ones. The
-//! checksums of a model file and of a PNG's chunks are recomputed, or nothing behind the checksum would be reached.
+//! checksums of a model file and of a PNG's chunks are recomputed, because a wrong checksum ends the checks.
 //! Every accepted file is drawn. A refusal's message is short and contains no terminal control sequence.
 //! `cargo test` does this for about a second. `cargo fuzz-models` does it for two minutes, or
 //! `CRYSTAL_BALL_FUZZ_MINUTES`, from the seed `CRYSTAL_BALL_FUZZ_SEED`, or a fresh one.
@@ -25,26 +25,26 @@ use texmap::{Mapper, Texture};
 /// The offset of a model file's counts, after magic, version, length and checksum.
 const COUNTS: usize = 20;
 
-/// Prints the seed of a case that panicked.
-struct Case(u64);
+/// Prints the seed of a case if it panics.
+struct SeedReport(u64);
 
-impl Drop for Case {
+impl Drop for SeedReport {
     fn drop(&mut self) {
         if thread::panicking() {
-            eprintln!("this was the case of seed {}", self.0);
+            eprintln!("the case of seed {} panicked", self.0);
         }
     }
 }
 
 /// Memory for drawing, kept from case to case.
-struct Room {
+struct DrawMemory {
     arena: InPlace<Arena>,
     storage: InPlace<Storage>,
     painted: Box<[u8; MAX_TEXELS]>,
     page: Box<PlanarBuffer>,
 }
 
-impl Room {
+impl DrawMemory {
     fn new() -> Self {
         Self {
             arena: in_place::boxed!(Arena),
@@ -147,7 +147,7 @@ fn run(
 ) -> (u64, u64) {
     let (mut cases, mut accepted) = (0, 0);
     while more(cases) {
-        let guard = Case(first.wrapping_add(cases));
+        let guard = SeedReport(first.wrapping_add(cases));
         accepted += u64::from(case(&mut Rng::with_seed(guard.0)));
         cases += 1;
     }
@@ -184,7 +184,7 @@ fn number(random: &mut Rng) -> i32 {
 }
 
 /// Changes a model file; returns whether it was accepted nevertheless.
-fn model_file_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
+fn model_file_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) -> bool {
     let before = random.choice(good).unwrap();
     let mut bytes = before.clone();
     for _ in 0..random.usize(1..6) {
@@ -221,7 +221,7 @@ fn model_file_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool 
     }
     match ModelFile::parse(&bytes) {
         Ok(model_file) => {
-            room.draw(&model_file, random);
+            memory.draw(&model_file, random);
             true
         }
         Err(error) => {
@@ -239,7 +239,7 @@ fn check_message(error: &anyhow::Error) {
 }
 
 /// Changes an OBJ; returns whether it makes a model nevertheless, which is then drawn.
-fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
+fn obj_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) -> bool {
     const WORDS: [&str; 46] = [
         "0",
         "-0",
@@ -330,7 +330,7 @@ fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
             assert!(bytes.len() <= MAX_BYTES);
             let model_file =
                 ModelFile::parse(&bytes).expect("what is made of an OBJ is a good model file");
-            room.draw(&model_file, random);
+            memory.draw(&model_file, random);
             true
         }
         Err(error) => {
@@ -504,7 +504,7 @@ fn pngs() -> Vec<Vec<u8>> {
 
 /// Runs all kinds, each until its `more` returns false.
 fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
-    let mut room = Room::new();
+    let mut memory = DrawMemory::new();
     let objs = objs();
     let model_files: Vec<_> = objs
         .iter()
@@ -512,12 +512,12 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
         .collect();
     let pngs = pngs();
     for bytes in &model_files {
-        room.draw(&ModelFile::parse(bytes).unwrap(), &mut Rng::with_seed(seed));
+        memory.draw(&ModelFile::parse(bytes).unwrap(), &mut Rng::with_seed(seed));
     }
     for png in &pngs {
         texture::read(Cursor::new(png)).unwrap();
     }
-    let mut tell = |kind: &str, case: &mut dyn FnMut(&mut Rng) -> bool| {
+    let mut report = |kind: &str, case: &mut dyn FnMut(&mut Rng) -> bool| {
         let begun = Instant::now();
         let (cases, accepted) = run(seed, |cases| more(kind, cases), case);
         eprintln!(
@@ -530,27 +530,27 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
         let some = accepted * 100 > cases && accepted < cases;
         assert!(some || cases < 1000, "{kind}");
     };
-    tell("model files", &mut |random| {
-        model_file_case(&model_files, &mut room, random)
+    report("model files", &mut |random| {
+        model_file_case(&model_files, &mut memory, random)
     });
-    tell("OBJs", &mut |random| obj_case(&objs, &mut room, random));
-    tell("PNGs", &mut |random| png_case(&pngs, random));
-    tell("PNGs' chunks", &mut |random| chunks_case(&pngs, random));
+    report("OBJs", &mut |random| obj_case(&objs, &mut memory, random));
+    report("PNGs", &mut |random| png_case(&pngs, random));
+    report("PNGs' chunks", &mut |random| chunks_case(&pngs, random));
 }
 
 #[test]
-fn nothing_in_any_state_panics() {
+fn no_damaged_file_causes_a_panic() {
     let (seed, most) = (seeded::generator().get_seed(), seeded::cases(2000) as u64);
     all(seed, |_, cases| cases < most);
 }
 
 #[test]
 #[ignore = "minutes: cargo fuzz-models"]
-fn nothing_in_any_state_panics_for_minutes() {
+fn no_damaged_file_causes_a_panic_for_minutes() {
     let number = |name: &str, default| match std::env::var(name) {
         Ok(text) => text
             .parse()
-            .unwrap_or_else(|_| panic!("{name} is no number: {text}")),
+            .unwrap_or_else(|_| panic!("{name}: '{text}' is not a number")),
         Err(_) => default,
     };
     let minutes: f64 = number("CRYSTAL_BALL_FUZZ_MINUTES", 2.0);

@@ -95,7 +95,7 @@ fn expected(version: &str, (vga, arguments): &Configuration) -> Expected {
 }
 
 #[test]
-fn expectations_know_the_versions() {
+fn the_expected_results_depend_on_qemus_version() {
     let smm_off = ("std", "-machine q35,smm=off".to_string());
     for (version, expects) in [
         ("7.2.22 (Debian 1:7.2)", Expected::Equal),
@@ -183,7 +183,7 @@ fn boots(ready: &Ready, done: &mut usize) -> anyhow::Result<()> {
 }
 
 #[test]
-#[ignore = "takes minutes for each QEMU; run it by `cargo wide`"]
+#[ignore = "runs for minutes with each QEMU; run it by `cargo wide`"]
 fn wide_set() {
     let listed = std::env::var_os("CRYSTAL_BALL_QEMUS").unwrap_or_default();
     let listed = std::env::split_paths(&listed).filter(|path| !path.as_os_str().is_empty());

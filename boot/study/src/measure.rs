@@ -14,7 +14,7 @@ use bench::{Ask, Figure, LENGTHS, MAX_ROUNDS, Work};
 use protocol::OK;
 use texmap::{Mapper, Order};
 
-use qemu::Machine;
+use qemu::Vm;
 use setup::{Options, Ready};
 use system::Progress;
 
@@ -302,7 +302,7 @@ fn asked(config: &Config) -> impl Iterator<Item = (Mapper, Order)> {
 
 /// A machine that runs the benchmark kernel.
 struct Guest {
-    machine: Machine,
+    machine: Vm,
 }
 
 impl Guest {
@@ -310,7 +310,7 @@ impl Guest {
         let arguments = ["-cpu", cpu.name()]
             .into_iter()
             .chain(arguments.iter().copied());
-        let machine = Machine::boot(&qemu::Config {
+        let machine = Vm::boot(&qemu::Config {
             arguments: arguments.map(Into::into).collect(),
             ..qemu::Config::new(ready)
         })?;

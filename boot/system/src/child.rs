@@ -1,5 +1,7 @@
 //! Child processes that end with this program.
 //!
+//! All uses of `setpriv` and of shell scripts to start a process are in this module.
+//!
 //! A host program that is killed must not leave a QEMU, a download or a compiler behind. No clean-up code of
 //! ours can run after a `SIGKILL`, so the operating system has to end the children. Linux does so by the
 //! parent-death signal, which a child requests for itself. util-linux's `setpriv` makes the request where it is
@@ -14,6 +16,7 @@
 
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read};
+use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
@@ -39,6 +42,16 @@ const SINGLE_SCRIPT: &str = r#"[ "$PPID" = "$1" ] || exit 1; shift; exec "$@""#;
 const GROUP_SCRIPT: &str =
     r#"trap 'kill -KILL 0' TERM; [ "$PPID" = "$1" ] || exit 1; shift; "$@" & wait $!"#;
 
+/// The descriptors of the sockets of [`command_with_sockets`] in the child.
+pub const SOCKETS: [i32; 2] = [3, 4];
+
+/// Moves the sockets from standard input and output to the descriptors [`SOCKETS`].
+///
+/// The standard library passes only the standard descriptors to a child. A descriptor that every child
+/// inherits would also reach the children of other threads, and this program would then not notice that the
+/// child has closed its end.
+const SOCKETS_SCRIPT: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >&2"#;
+
 /// Returns a command whose process ends with this program, even by `SIGKILL`.
 ///
 /// Use it for one long-lived process, such as QEMU. The process has the id that [`Command::spawn`] reports.
@@ -46,6 +59,16 @@ const GROUP_SCRIPT: &str =
 /// The [module](self) explains the rule about threads.
 pub fn command(program: impl AsRef<OsStr>) -> Command {
     with_death_signal("KILL", SINGLE_SCRIPT, program.as_ref())
+}
+
+/// Returns a command as [`command`] does, whose process also has `sockets` as the descriptors [`SOCKETS`]. Its
+/// standard input is empty, and its standard output goes to standard error.
+pub fn command_with_sockets(program: impl AsRef<OsStr>, sockets: [OwnedFd; 2]) -> Command {
+    let [first, second] = sockets;
+    let mut command = command("sh");
+    command.args(["-c", SOCKETS_SCRIPT, "sh"]).arg(program);
+    command.stdin(first).stdout(second);
+    command
 }
 
 /// Returns a command for a program that starts others, such as cargo or apt-get: all of them end with this
@@ -224,6 +247,7 @@ fn quoted(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::net::UnixStream;
     use std::os::unix::process::ExitStatusExt;
 
     use super::*;
@@ -293,6 +317,22 @@ mod tests {
         let begun = Instant::now();
         run(command("sh").args(["-c", "sleep 20 & echo"])).unwrap();
         assert!(begun.elapsed() < Duration::from_secs(10));
+    }
+
+    #[test]
+    fn a_command_gets_its_sockets_as_descriptors_3_and_4() {
+        let [(mut first, child_first), (mut second, child_second)] =
+            [(); 2].map(|()| UnixStream::pair().unwrap());
+        let mut command = command_with_sockets("sh", [child_first.into(), child_second.into()]);
+        command.args(["-c", "echo three >&3; echo four >&4"]);
+        assert!(command.status().unwrap().success());
+        // The command holds the child's ends of the sockets.
+        drop(command);
+        for (socket, expected) in [(&mut first, "three\n"), (&mut second, "four\n")] {
+            let mut text = String::new();
+            socket.read_to_string(&mut text).unwrap();
+            assert_eq!(text, expected);
+        }
     }
 
     #[test]
