@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use fastrand::Rng;
 use frames::indexed::Indexed;
-use import::{Model, obj, solid, texture};
+use import::{Model, make_mesh, obj, texture};
 use in_place::InPlace;
 use model::{Arena, MAX_BYTES, ModelFile, Parts};
 use modex::PlanarBuffer;
@@ -117,16 +117,16 @@ fn objs() -> Vec<Vec<u8>> {
     ]
 }
 
-/// A model file from an OBJ, with a plain texture.
-fn packed(text: &[u8], frame: (u32, u32)) -> anyhow::Result<Vec<u8>> {
-    let (solid, layout) = solid(&obj::parse(text)?, frame)?;
+/// Returns a model file from an OBJ, with a plain texture.
+fn model_file(text: &[u8], frame: (u32, u32)) -> anyhow::Result<Vec<u8>> {
+    let (mesh, layout) = make_mesh(&obj::parse(text)?, frame)?;
     let (width, height) = layout.size();
     let texels = layout.cut(|i, j| (i ^ j) as u8);
     let parts = Parts {
         mesh: Mesh {
-            vertices: &solid.vertices,
-            corners: &solid.corners,
-            faces: &solid.faces,
+            vertices: &mesh.vertices,
+            corners: &mesh.corners,
+            faces: &mesh.faces,
             convex: false,
         },
         texture: Texture::new(&texels, width, height)?,
@@ -325,7 +325,7 @@ fn obj_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) -> bool
         // The whole path, including the messages that name formats.
         return Model::new(&text, None).inspect_err(check_message).is_ok();
     }
-    match packed(&text, frame) {
+    match model_file(&text, frame) {
         Ok(bytes) => {
             assert!(bytes.len() <= MAX_BYTES);
             let model_file =
@@ -508,7 +508,7 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
     let objs = objs();
     let model_files: Vec<_> = objs
         .iter()
-        .map(|text| packed(text, (16, 16)).unwrap())
+        .map(|text| model_file(text, (16, 16)).unwrap())
         .collect();
     let pngs = pngs();
     for bytes in &model_files {

@@ -52,7 +52,7 @@ fn beam(vga: &mut Vga, clock: usize) -> Vec<(u8, usize)> {
 }
 
 #[test]
-fn the_beam_is_where_the_registers_say() {
+fn the_beam_is_where_the_registers_put_it() {
     let retrace = VERTICAL_RETRACE | DISPLAY_DISABLED;
     let frame = |retraces: usize, line: u8| {
         let blank = 37 - retraces;
@@ -80,7 +80,7 @@ fn the_beam_is_where_the_registers_say() {
 }
 
 #[test]
-fn every_access_takes_its_time() {
+fn every_access_lasts_three_character_clocks() {
     let mut vga = striped();
     vga.finish_frame();
     // The retrace is two lines long: 66 accesses of 3 clocks, and the 67th is past its end.
@@ -107,7 +107,7 @@ fn every_access_takes_its_time() {
 }
 
 #[test]
-fn a_start_address_is_taken_over_when_the_latch_says() {
+fn a_start_address_is_latched_at_the_chosen_moment() {
     for (latch, line) in [
         (Latch::DisplayEnd, 480),
         (Latch::RetraceStart, 490),
@@ -192,7 +192,7 @@ fn play(vga: &mut Vga, log: &[Access]) {
 }
 
 #[test]
-fn a_log_played_to_another_card_makes_it_the_same() {
+fn a_log_replayed_on_another_card_gives_the_same_page() {
     let mut vga = Vga::new();
     vga.start_log();
     let mut card = ModeX::set(&mut vga, &palette()).unwrap();

@@ -85,7 +85,7 @@ fn display_then_write(card: &mut ModeX<Vga>) {
 }
 
 #[test]
-fn whatever_comes_between_the_accesses_no_page_is_drawn_on_that_is_seen() {
+fn no_displayed_page_is_drawn_on_whatever_interrupts_the_flip() {
     for latch in LATCHES {
         let delay = Rc::new(Cell::new(0));
         let (mut card, left) = card(latch, delay.clone());
@@ -116,7 +116,7 @@ fn whatever_comes_between_the_accesses_no_page_is_drawn_on_that_is_seen() {
 
 /// The test can fail: with the other order it does, just where the driver's comment says.
 #[test]
-fn the_other_order_tears_when_an_interrupt_comes_before_the_write() {
+fn the_other_order_tears_if_an_interrupt_comes_before_the_write() {
     // The middle of the last line that is shown, as seen from each take-over; the display is seen by
     // access 0, and the write is access 1.
     for (latch, lines) in [(Latch::DisplayEnd, 47), (Latch::RetraceStart, 37)] {
@@ -135,9 +135,8 @@ fn the_other_order_tears_when_an_interrupt_comes_before_the_write() {
     }
 }
 
-/// Pages that are drawn and never shown do not come round to the one that is.
 #[test]
-fn pages_that_are_not_flipped_to_leave_the_shown_one_alone() {
+fn pages_that_are_drawn_and_not_flipped_to_never_reach_the_displayed_page() {
     let mut card = ModeX::set(Vga::new(), &BLACK).unwrap();
     for _ in 0..2 {
         for _ in 0..7 {
@@ -151,7 +150,7 @@ fn pages_that_are_not_flipped_to_leave_the_shown_one_alone() {
 
 /// Frame after frame, drawn by the driver, with an interrupt of any length before one access in a few.
 #[test]
-fn pages_rotate_unseen_whatever_interrupts() {
+fn the_driver_never_draws_on_a_displayed_page_whatever_interrupts() {
     let mut random = seeded::generator();
     for case in 0..seeded::cases(12) {
         let latch = LATCHES[case % 3];

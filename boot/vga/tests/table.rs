@@ -124,7 +124,7 @@ const FREE: [(&str, u8, u8, &str); 2] = [
 
 /// How the card takes a mode set with one bit of the table wrong: in the words of a fault, or of what
 /// the monitor shows in place of page 0.
-fn noticed(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String> {
+fn fault_of(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String> {
     let mut card = Mistaken {
         vga: Vga::new(),
         block,
@@ -157,7 +157,7 @@ fn noticed(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String>
 }
 
 #[test]
-fn no_bit_of_the_table_can_be_wrong() {
+fn every_wrong_bit_of_the_register_table_is_a_fault() {
     let mut silent = Vec::new();
     for (block, registers) in MODE_X.blocks() {
         for (index, &right) in (0..).zip(registers) {
@@ -165,7 +165,7 @@ fn no_bit_of_the_table_can_be_wrong() {
                 let free = FREE
                     .iter()
                     .any(|&(b, i, bits, _)| (b, i) == (block, index) && bits & bit != 0);
-                let words = noticed(block, index, right, bit);
+                let words = fault_of(block, index, right, bit);
                 if words.is_none() != free {
                     silent.push(format!("{block} {index:02X} bit {bit:02X}: {words:?}"));
                 }
@@ -174,12 +174,12 @@ fn no_bit_of_the_table_can_be_wrong() {
     }
     assert!(silent.is_empty(), "{silent:#?}");
     // And with no bit wrong nobody says a word.
-    assert_eq!(noticed("misc", 0, MODE_X.misc, 0), None);
+    assert_eq!(fault_of("misc", 0, MODE_X.misc, 0), None);
 }
 
 /// The words say which registers, and by how much.
 #[test]
-fn a_wrong_time_is_named_with_what_is_needed() {
+fn a_wrong_time_is_reported_with_the_required_time() {
     for (index, bit, words) in [
         (
             0x00,
@@ -224,11 +224,11 @@ fn a_wrong_time_is_named_with_what_is_needed() {
         (
             0x17,
             0x80,
-            "CR17 = 63h: bits 80h are to be 80h: the syncs are on",
+            "CR17 = 63h: bits 80h must be 80h: the syncs are on",
         ),
     ] {
         let right = MODE_X.crtc[usize::from(index)];
-        let said = noticed("crtc", index, right, bit).unwrap_or_default();
+        let said = fault_of("crtc", index, right, bit).unwrap_or_default();
         assert!(said.contains(words), "{words}: {said}");
     }
 }
