@@ -8,7 +8,7 @@ use frames::golden::{self, Golden};
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::coverage::inside;
 use oracle::depth;
-use oracle::solid::{self, Checker, Compared, Solid};
+use oracle::solid::{self, Solid, SolidChecker, SolidCounts};
 use oracle::texel::{affine, perspective};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{FOCAL_LENGTH, Pose, Stage, Storage};
@@ -208,13 +208,13 @@ fn the_oracle_draws_every_golden() {
 #[test]
 fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     let mut random = seeded::generator();
-    let mut checker = Checker::default();
+    let mut checker = SolidChecker::default();
     let ball = Solid::ball();
     let mut compare = |solid: &Solid, pose: &Pose| {
         let compared = checker.by_sight(solid, pose);
         compared.unwrap_or_else(|wrong| panic!("{wrong}: {pose:?}"))
     };
-    let mut far = Compared::default();
+    let mut far = SolidCounts::default();
     let mut goldens = golden::find(&golden_folder()).unwrap();
     goldens.retain(|golden| scene(golden).name == "ball");
     for golden in goldens.iter().take(seeded::cases(goldens.len())) {
@@ -225,7 +225,7 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
         let distance = random.i32(66_000..furthest);
         far += compare(&ball, &solid::pose(&mut random, distance));
     }
-    let mut near = Compared::default();
+    let mut near = SolidCounts::default();
     for _ in 0..seeded::cases(60) {
         // Within 1/512 or 1/8 unit of a vertex along each axis; the near plane is at 1/512 unit.
         let reach = random.choice([128, 1 << 13]).unwrap();
@@ -237,7 +237,7 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
         near += compare(&seen.inside_out(), &pose);
     }
     for (name, compared) in [("from afar", &far), ("from nearby", &near)] {
-        let Compared {
+        let SolidCounts {
             pixels,
             changed,
             furthest,
