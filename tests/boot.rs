@@ -136,8 +136,8 @@ fn the_running_demo_keeps_its_pace_and_can_be_held() {
     machine.leave().unwrap();
 }
 
-/// Presses keys until the log has a change that ends in `change`, and returns the log. QEMU passes keys on with
-/// a delay, and drops those that do not fit its buffer.
+/// Presses keys until the log has a change that ends in `change`, and returns the log. QEMU passes keys on
+/// with a delay, and drops those that do not fit its buffer.
 fn logged(machine: &mut Vm, change: &str, press: impl Fn(&mut Vm)) -> Vec<String> {
     for _ in 0..600 {
         press(machine);

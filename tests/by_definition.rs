@@ -33,12 +33,12 @@ fn pose(golden: &Golden) -> Pose {
 
 /// What the definitions allow at each pixel: the colours, and the number of polygons that cover it. Polygons
 /// that hide each other count as one.
-struct Expected {
+struct ExpectedFrame {
     colours: Vec<Vec<u8>>,
     covered: Vec<u8>,
 }
 
-impl fmt::Debug for Expected {
+impl fmt::Debug for ExpectedFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an expected frame")
     }
@@ -78,9 +78,9 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
         .collect()
 }
 
-fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
+fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> ExpectedFrame {
     let (background, convex) = (stage.background(), stage.is_convex());
-    let mut expected = Expected {
+    let mut expected = ExpectedFrame {
         colours: (0..WIDTH * HEIGHT)
             .map(|i| vec![background[i / WIDTH]])
             .collect(),
@@ -124,7 +124,7 @@ fn expected(stage: &mut Stage<'_>, pose: &Pose, mapper: Mapper) -> Expected {
 }
 
 /// Compares a frame's pixels with the expected ones.
-fn compare(name: &str, expected: &Expected, pixel: impl Fn(usize) -> u8) {
+fn compare(name: &str, expected: &ExpectedFrame, pixel: impl Fn(usize) -> u8) {
     for (i, (allowed, covered)) in expected.colours.iter().zip(&expected.covered).enumerate() {
         let (x, y) = (i % WIDTH, i / WIDTH);
         assert!(
@@ -142,7 +142,7 @@ fn compare(name: &str, expected: &Expected, pixel: impl Fn(usize) -> u8) {
 /// Compares only which pixels show the background; another test checks the texels.
 fn compare_coverage(
     name: &str,
-    expected: &Expected,
+    expected: &ExpectedFrame,
     background: &[u8],
     pixel: impl Fn(usize) -> u8,
 ) {

@@ -118,8 +118,8 @@ fn objs() -> Vec<Vec<u8>> {
 }
 
 /// Returns a model file from an OBJ, with a plain texture.
-fn model_file(text: &[u8], frame: (u32, u32)) -> anyhow::Result<Vec<u8>> {
-    let (mesh, layout) = make_mesh(&obj::parse(text)?, frame)?;
+fn model_file(text: &[u8], image: (u32, u32)) -> anyhow::Result<Vec<u8>> {
+    let (mesh, layout) = make_mesh(&obj::parse(text)?, image)?;
     let (width, height) = layout.size();
     let texels = layout.cut(|i, j| (i ^ j) as u8);
     let parts = Parts {
@@ -318,14 +318,14 @@ fn obj_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) -> bool
         }
     }
     let text = rewritten(lines.join(&b'\n'), random);
-    let frame = *random
+    let image = *random
         .choice(&[(16, 16), (1, 1), (5, 300), (8192, 1)])
         .unwrap();
     if random.u8(..16) == 0 {
         // The whole path, including the messages that name formats.
         return Model::new(&text, None).inspect_err(check_message).is_ok();
     }
-    match model_file(&text, frame) {
+    match model_file(&text, image) {
         Ok(bytes) => {
             assert!(bytes.len() <= MAX_BYTES);
             let model_file =
@@ -454,8 +454,8 @@ fn is_read(bytes: &[u8]) -> bool {
         let _ = Indexed::read_png(Cursor::new(bytes));
     }
     match texture::read(Cursor::new(bytes)) {
-        Ok(frame) => {
-            let (width, height) = frame.pixels.dimensions();
+        Ok(image) => {
+            let (width, height) = image.pixels.dimensions();
             assert!(width > 0 && height > 0);
             true
         }

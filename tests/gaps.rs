@@ -2,8 +2,8 @@
 //!
 //! The figure is a turned sheet of quadrilaterals. Its fields alternate between two methods of finding edges:
 //! integers from whole-pixel vertices, and 16.16 fixed point from the exact vertices. Each method alone would
-//! leave no gap; where the two meet, pixels are left out and others are written twice. Beside it is the same sheet
-//! as this project draws it, every field by one exact rule.
+//! leave no gap; where the two meet, pixels are left out and others are written twice. Beside it is the same
+//! sheet as this project draws it, every field by one exact rule.
 //!
 //! `cargo gaps` writes `docs/gaps.png`.
 
@@ -170,7 +170,7 @@ fn exact() -> WriteCounts {
 }
 
 #[test]
-fn mixed_edges_leave_gaps_and_exact_ones_do_not() {
+fn mixed_edges_leave_gaps_and_exact_edges_do_not() {
     let (gaps, doubles) = mixed().faults();
     assert!(gaps > 50 && doubles > 50, "{gaps} gaps, {doubles} doubles");
     assert_eq!(exact().faults(), (0, 0));
@@ -178,7 +178,7 @@ fn mixed_edges_leave_gaps_and_exact_ones_do_not() {
 
 #[test]
 #[ignore = "writes docs/gaps.png; run it by `cargo gaps`"]
-fn frame() {
+fn both_sheets_are_drawn_side_by_side() {
     const BACKGROUND: u8 = 0;
     const GAP: u8 = 3;
     const DOUBLE: u8 = 4;
@@ -212,19 +212,19 @@ fn frame() {
     }
     for (name, page) in ["mixed", "exact"].iter().zip(&pages) {
         let (gaps, doubles) = page.faults();
-        println!("{name}: {gaps} pixels left out, {doubles} written twice");
+        println!("{name}: {gaps} pixels missing, {doubles} written twice");
     }
     // Each pixel two by two, so that a missing pixel is visible.
     let wide = pixels.chunks(2 * WIDTH).flat_map(|row| {
         let row: Vec<u8> = row.iter().flat_map(|&pixel| [pixel; 2]).collect();
         [row.clone(), row].concat()
     });
-    let frame = Indexed {
+    let image = Indexed {
         width: 4 * WIDTH,
         height: 2 * HEIGHT,
         palette,
         pixels: wide.collect(),
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/gaps.png");
-    frame.write_png(File::create(path).unwrap()).unwrap();
+    image.write_png(File::create(path).unwrap()).unwrap();
 }

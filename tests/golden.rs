@@ -426,12 +426,12 @@ fn emulate_and_dump_write_the_same_files() {
 
 /// A write to the card, one byte at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Write {
+enum CardWrite {
     Port(u16, u8),
     Memory(u16, u8),
 }
 
-impl Write {
+impl CardWrite {
     /// Parses a line of QEMU's trace; `None` for another device.
     fn traced(line: &str) -> Option<Self> {
         let hex = |name: &str| {
@@ -465,7 +465,8 @@ impl Write {
 }
 
 /// Compares QEMU's own record of every write with the emulated VGA's log. Neither the kernel nor this project
-/// made that record, so it proves, without trust in the kernel, that each column needs only one Map Mask write.
+/// made that record, so it proves, without trust in the kernel, that each column needs only one Map Mask
+/// write.
 #[test]
 fn qemus_trace_of_a_frame_equals_the_emulated_vgas_log() {
     let folder = tempfile::tempdir().unwrap();
@@ -492,9 +493,9 @@ fn qemus_trace_of_a_frame_equals_the_emulated_vgas_log() {
     emulated.vga().start_log();
     emulated.ask(show).unwrap();
     let log = emulated.vga().take_log();
-    let logged: Vec<_> = log.iter().flat_map(Write::logged).collect();
+    let logged: Vec<_> = log.iter().flat_map(CardWrite::logged).collect();
     let text = std::fs::read_to_string(&trace).unwrap();
-    let traced: Vec<_> = text.lines().filter_map(Write::traced).collect();
+    let traced: Vec<_> = text.lines().filter_map(CardWrite::traced).collect();
     for (i, (traced, logged)) in traced.iter().zip(&logged).enumerate() {
         assert_eq!(
             traced, logged,
@@ -505,7 +506,7 @@ fn qemus_trace_of_a_frame_equals_the_emulated_vgas_log() {
     // 3C4h index 2 is Map Mask: one write to erase, and one for each column drawn.
     let map_masks = traced
         .windows(2)
-        .filter(|pair| matches!(pair, [Write::Port(0x3C4, 2), Write::Port(0x3C5, _)]));
+        .filter(|pair| matches!(pair, [CardWrite::Port(0x3C4, 2), CardWrite::Port(0x3C5, _)]));
     let counts = emulated.ask(Command::Counts).unwrap();
     let mut columns = counts[0].split(' ').skip_while(|word| *word != "columns");
     let columns: usize = columns.nth(1).unwrap().parse().unwrap();

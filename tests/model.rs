@@ -47,8 +47,8 @@ fn model() -> Model {
     Model::load(&obj, Some(&png)).unwrap()
 }
 
-/// A machine whose ramdisk contains these bytes. If `model_file` is a checksum, the machine must accept the model file
-/// with it.
+/// A machine whose ramdisk contains these bytes. If `model_file` is a checksum, the machine must accept the
+/// model file with it.
 fn boot(ramdisk: Vec<u8>, model_file: Option<u32>) -> Vm {
     let options = Options {
         ramdisk: Some(ramdisk),

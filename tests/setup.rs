@@ -1,7 +1,7 @@
-//! The set-up from the outside, with success and failure, in sandboxes. A sandbox is a process with a separate
-//! cache, home, target folder and `PATH`, where small shell scripts replace rustup, apt-get, cargo and QEMU. So
-//! the tests do not touch the user's files, a complete set-up lasts a quarter of a second, and a test can
-//! provoke any failure.
+//! The set-up from the outside, with success and failure, in sandboxes. A sandbox is a process with a
+//! separate cache, home, target folder and `PATH`, where small shell scripts replace rustup, apt-get, cargo
+//! and QEMU. So the tests do not touch the user's files, a complete set-up lasts a quarter of a second, and a
+//! test can provoke any failure.
 //!
 //! The real steps (packages from the archive, compilers, minutes of building) use the same code. The first
 //! `cargo test` on a new machine runs them, and so does `a_real_set_up_continues_after_a_kill`, by hand:
@@ -97,8 +97,8 @@ impl Sandbox {
         sandbox
     }
 
-    /// Returns a sandbox without programs, except this test's program in the target folder, as if it had been built
-    /// there.
+    /// Returns a sandbox without programs, except this test's program in the target folder, as if it had been
+    /// built there.
     fn empty(real: bool) -> Self {
         let sandbox = Self {
             folder: tempfile::tempdir().unwrap(),
@@ -265,22 +265,22 @@ impl Outcome {
 
     /// Checks that the set-up failed and that its messages contain all these texts.
     #[track_caller]
-    fn failed(self, words: &[&str]) -> Self {
+    fn failed(self, texts: &[&str]) -> Self {
         assert_eq!(self.code, Some(1), "{}", self.text);
-        self.with_text(words)
+        self.with_text(texts)
     }
 
     #[track_caller]
-    fn with_text(self, words: &[&str]) -> Self {
-        for word in words {
-            assert!(self.text.contains(word), "no {word:?} in:\n{}", self.text);
+    fn with_text(self, texts: &[&str]) -> Self {
+        for text in texts {
+            assert!(self.text.contains(text), "no {text:?} in:\n{}", self.text);
         }
         self
     }
 
     #[track_caller]
-    fn without_text(self, word: &str) -> Self {
-        assert!(!self.text.contains(word), "{word:?} in:\n{}", self.text);
+    fn without_text(self, text: &str) -> Self {
+        assert!(!self.text.contains(text), "{text:?} in:\n{}", self.text);
         self
     }
 }
@@ -464,14 +464,14 @@ fn the_message_about_a_missing_compiler_names_every_failed_source_and_every_reme
         "rustup",
         "echo 'error: could not download: no network' >&2; exit 1",
     );
-    let words = [
+    let texts = [
         "- rustup: ",
         "could not download: no network",
         "- Debian's packages: this is not a Debian system",
         "rustup toolchain install 1.96.0",
         "--toolchain DIR",
     ];
-    sandbox.run("image").failed(&words);
+    sandbox.run("image").failed(&texts);
     sandbox.remove("rustup");
     sandbox
         .run("image")
@@ -589,7 +589,7 @@ fn the_message_about_another_version_in_the_archive_names_both_versions() {
     let asked = fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
     assert!(
         asked.contains("Dir::State::lists"),
-        "newer lists are tried first, in a place of our own:\n{asked}"
+        "newer lists are tried first, in a private folder:\n{asked}"
     );
 }
 
@@ -900,7 +900,11 @@ fn children_and_grandchildren_end_with_the_set_up() {
         sleep(Duration::from_millis(200));
         let then = beats();
         sleep(Duration::from_millis(200));
-        assert_eq!(beats(), then, "a grandchild lives on after {signal_name}");
+        assert_eq!(
+            beats(),
+            then,
+            "a grandchild is still running after {signal_name}"
+        );
     }
 }
 

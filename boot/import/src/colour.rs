@@ -143,7 +143,7 @@ fn quantized(colours: &[Srgb<u8>], count: usize) -> Vec<Srgb<u8>> {
         .quantize_method(QuantizeMethod::kmeans());
     let input = pipeline
         .input_slice(colours)
-        .expect("there are some, and not too many");
+        .expect("a texture has 1 to 65 536 colours");
     input.output_srgb8_palette().into_vec()
 }
 

@@ -94,8 +94,8 @@ impl ImportedMesh {
                 });
             };
             let n = corners.len();
-            let whole = first_corner_of_uncut(&polygon.ring, polygon.normal, &corners);
-            triangles += whole.map_or(n - 2, |_| 1);
+            let uncut = first_corner_of_uncut(&polygon.ring, polygon.normal, &corners);
+            triangles += uncut.map_or(n - 2, |_| 1);
             // Checked before the cut, because to cut a face that visits the same points again and again
             // needs seconds.
             if triangles > MAX_FACES {
@@ -107,7 +107,7 @@ impl ImportedMesh {
                 let line = polygon.line;
                 return Err(BadLine { line, why }.into());
             }
-            match whole {
+            match uncut {
                 Some(first) => add(&mut (0..n).map(|i| (first + i) % n)),
                 None => {
                     let triangles = ears.cut(&polygon.ring);
@@ -181,7 +181,7 @@ fn first_corner_of_uncut(
         let (a, b) = (&ring[i], &ring[(i + 1) % n]);
         ring.iter().all(|c| area(a, b, c) <= 0.0)
     });
-    let whole: f64 = -(1..n - 1)
+    let area_of_face: f64 = -(1..n - 1)
         .map(|i| area(&ring[0], &ring[i], &ring[i + 1]))
         .sum::<f64>();
     let height = |place: &PolygonCorner| dot(minus(place.at, ring[0].at), normal);
@@ -199,7 +199,7 @@ fn first_corner_of_uncut(
         -area(a, b, c)
     };
     let first = (0..n).max_by(|&a, &b| anchored(a).total_cmp(&anchored(b)))?;
-    if anchored(first) < LEAST_ANCHORED * whole {
+    if anchored(first) < LEAST_ANCHORED * area_of_face {
         return None;
     }
     let three = anchors(first);

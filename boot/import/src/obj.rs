@@ -668,9 +668,9 @@ mod tests {
         assert_eq!(tagged.kinds, [(b"t".to_vec(), 8, 1)]);
         let many =
             skipped("vw 1\nt\nusemap a\nvw 2\ncstype b\ncurv 1\nsurf 1\nend\nend\n\x1b[0m\n");
-        let words = "10 statements skipped (2 'vw', 1 't', 1 'usemap', 1 'cstype', 1 'curv', \
+        let expected = "10 statements skipped (2 'vw', 1 't', 1 'usemap', 1 'cstype', 1 'curv', \
                      1 'surf', 3 others)";
-        assert_eq!(many.to_string(), words);
+        assert_eq!(many.to_string(), expected);
         let escape = skipped("\x1b[0m").to_string();
         assert_eq!(escape, r"1 statement skipped (1 '\x1b[0m')");
     }

@@ -1,7 +1,7 @@
 //! The state of a run, derived from its events alone, and the verdict on it.
 //!
-//! Nothing here waits or talks to QEMU: [`RunState::handle`] returns the action that the caller must carry out. A
-//! test can therefore judge the recorded events of any QEMU version.
+//! Nothing here waits or talks to QEMU: [`RunState::handle`] returns the action that the caller must carry
+//! out. A test can therefore judge the recorded events of any QEMU version.
 
 use std::collections::VecDeque;
 use std::process::ExitStatus;

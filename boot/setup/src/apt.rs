@@ -75,9 +75,9 @@ pub struct Package {
 impl Package {
     /// Parses `'URI' FILE BYTES SHA256:HASH`.
     fn parse(line: &str) -> Option<Self> {
-        let mut words = line.strip_prefix('\'')?.split_once("' ")?.1.split(' ');
-        let (file, bytes) = (words.next()?.to_owned(), words.next()?.parse().ok()?);
-        let sha256 = words.next()?.strip_prefix("SHA256:")?.to_owned();
+        let mut fields = line.strip_prefix('\'')?.split_once("' ")?.1.split(' ');
+        let (file, bytes) = (fields.next()?.to_owned(), fields.next()?.parse().ok()?);
+        let sha256 = fields.next()?.strip_prefix("SHA256:")?.to_owned();
         Some(Self {
             file,
             bytes,
@@ -418,8 +418,8 @@ impl<'a> Apt<'a> {
         child::run(&mut command).map(|text| Package::parse_all(&text))
     }
 
-    /// Returns the names of `request.with_dependencies` and of all their dependencies, without the packages that the
-    /// system has.
+    /// Returns the names of `request.with_dependencies` and of all their dependencies, without the packages
+    /// that the system has.
     fn needed(&self, request: &Request) -> anyhow::Result<Vec<String>> {
         let mut plan = self.command();
         plan.args(["-o", "Dir::State::status=/dev/null"]);

@@ -179,7 +179,7 @@ pub fn is_full(error: &anyhow::Error) -> bool {
     by_kind
         || ["No space left on device", "Disk quota exceeded"]
             .iter()
-            .any(|words| text.contains(words))
+            .any(|message| text.contains(message))
 }
 
 /// Removes a file, or a folder with its contents.

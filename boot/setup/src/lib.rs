@@ -84,7 +84,7 @@ pub fn ready_to_measure(options: &Options) -> anyhow::Result<Ready> {
 
 fn ready_with(options: &Options, program: Program) -> anyhow::Result<Ready> {
     let cache = Cache::find()?.lock()?;
-    // QEMU comes first: without a way to get it, this fails at once, and the other parts take minutes.
+    // QEMU comes first: without a way to get it, the set-up fails at once, and the other parts need minutes.
     let qemu = qemu::get(&cache, options)?;
     let (kernel, image) = boot_files(&cache, options, program)?;
     Ok(Ready {

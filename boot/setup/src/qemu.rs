@@ -201,7 +201,7 @@ fn unpack(cache: &LockedCache, window: bool, suite: Option<&str>) -> anyhow::Res
         never: &[],
         suite,
         check: |_| Ok(()),
-        // Measured: the unpacked files take 4 times the space of the packages.
+        // Measured: the unpacked files need 4 times the space of the packages.
         room: |bytes| 5 * bytes,
     };
     let temporary = cache.temporary_folder()?;

@@ -4,8 +4,8 @@
 //!
 //! A host program that is killed must not leave a QEMU, a download or a compiler behind. No clean-up code of
 //! ours can run after a `SIGKILL`, so the operating system has to end the children. Linux does so by the
-//! parent-death signal, which a child requests for itself. util-linux's `setpriv` makes the request where it is
-//! installed. Without `setpriv`, children still end with every ordinary end of this program.
+//! parent-death signal, which a child requests for itself. util-linux's `setpriv` makes the request where it
+//! is installed. Without `setpriv`, children still end with every ordinary end of this program.
 //!
 //! This is by hand, in this module only: a process can set the signal of itself alone, so a crate (`rustix`,
 //! `nix`, `process-wrap`, `command-group`) would still need `CommandExt::pre_exec`, which is unsafe.
@@ -61,8 +61,8 @@ pub fn command(program: impl AsRef<OsStr>) -> Command {
     with_death_signal("KILL", SINGLE_SCRIPT, program.as_ref())
 }
 
-/// Returns a command as [`command`] does, whose process also has `sockets` as the descriptors [`SOCKETS`]. Its
-/// standard input is empty, and its standard output goes to standard error.
+/// Returns a command as [`command`] does, whose process also has `sockets` as the descriptors [`SOCKETS`].
+/// Its standard input is empty, and its standard output goes to standard error.
 pub fn command_with_sockets(program: impl AsRef<OsStr>, sockets: [OwnedFd; 2]) -> Command {
     let [first, second] = sockets;
     let mut command = command("sh");

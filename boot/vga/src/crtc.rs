@@ -15,7 +15,7 @@ const PROTECT: u8 = 0x80;
 #[rustfmt::skip]
 const UNTIMED_BITS: &[(u8, u8, u8, &str)] = &[
     (0x03, 0x80, 0x80, "lets CR10 and CR11 be read"),
-    (0x03, 0x60, 0x00, "the frame is not skewed against the syncs"),
+    (0x03, 0x60, 0x00, "the image is not skewed against the syncs"),
     (0x05, 0x60, 0x00, "the retrace is not skewed"),
     (0x08, 0xFF, 0x00, "no scrolling by lines or bytes"),
     (0x0A, 0xFF, 0x00, "the text cursor: not shown in graphics"),
@@ -36,7 +36,7 @@ const UNTIMED_BITS: &[(u8, u8, u8, &str)] = &[
 pub enum Latch {
     /// After the last displayed line.
     DisplayEnd,
-    /// When the vertical retrace begins, as FreeVGA says.
+    /// When the vertical retrace begins, as FreeVGA documents.
     #[default]
     RetraceStart,
     /// When the next frame's first line begins.

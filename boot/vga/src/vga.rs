@@ -92,8 +92,8 @@ impl Vga {
         self.log.take().unwrap_or_default()
     }
 
-    /// Returns the number of writes with a purpose to a port. On an index port, counts the writes to one register,
-    /// whether its index and data were written together or apart.
+    /// Returns the number of writes with a purpose to a port. On an index port, counts the writes to one
+    /// register, whether its index and data were written together or apart.
     pub fn port_writes(&self, purpose: Purpose, port: u16, index: Option<u8>) -> u64 {
         self.writes
             .get(&(purpose, port, index))

@@ -117,8 +117,8 @@ impl CoverageChecker {
         let Some(outline) = &case.outline else {
             return case.polygons.iter().map(|p| self.polygon(p)).sum();
         };
-        let whole = Area::around(outline);
-        self.union.clear(&whole);
+        let outline_area = Area::around(outline);
+        self.union.clear(&outline_area);
         let mut pixels = 0;
         for polygon in &case.polygons {
             pixels += self.polygon(polygon)?;
@@ -134,10 +134,10 @@ impl CoverageChecker {
                 }
             }
         }
-        self.oracle.cover(outline, &whole);
-        match difference(&self.oracle, &self.union, &whole) {
+        self.oracle.cover(outline, &outline_area);
+        match difference(&self.oracle, &self.union, &outline_area) {
             Some((x, y)) => Err(CoverageError::Gap(x, y)),
-            None => Ok(pixels + whole.pixels()),
+            None => Ok(pixels + outline_area.pixels()),
         }
     }
 

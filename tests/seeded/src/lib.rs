@@ -59,7 +59,8 @@ pub fn generator() -> Rng {
     Rng::with_seed(seed)
 }
 
-/// Returns how many cases a random test tries: `usual`, or the value of [`CASES`] if that is smaller, but at least 1.
+/// Returns how many cases a random test tries: `usual`, or the value of [`CASES`] if that is smaller, but at
+/// least 1.
 ///
 /// # Panics
 /// If [`CASES`] is set, but not to a number.

@@ -254,7 +254,8 @@ fn main() -> ExitCode {
     sweep(&plan, &arguments)
 }
 
-/// Announces the sweep, and returns its progress: in cases of each mix, or in seconds if only `limit` ends it.
+/// Announces the sweep, and returns its progress: in cases of each mix, or in seconds if only `limit` ends
+/// it.
 fn progress(limit: Option<Duration>, from: u64, end: u64) -> Progress {
     let seconds = limit.map_or(0, |limit| limit.as_secs());
     if end == u64::MAX {
