@@ -16,27 +16,27 @@ use std::time::{Duration, Instant};
 use frames::backend::{self, Backend, EmulatedDemo};
 use modex::registers::MODE_X;
 use protocol::{Action, Change, Command, Content, FailKind, FrameName};
-use qemu::{Config, Limits, Machine, Verdict};
+use qemu::{Config, Limits, Verdict, Vm};
 use rustix::process::{Pid, Signal, kill_process};
 
-use crate::judged::{Judged, verdict};
+use crate::expected_failure::ExpectedFailure;
 use crate::ready::{READY, config};
 
-fn boot() -> Machine {
+fn boot() -> Vm {
     boot_with(&[], Limits::default())
 }
 
-fn boot_with(arguments: &[&str], limits: Limits) -> Machine {
+fn boot_with(arguments: &[&str], limits: Limits) -> Vm {
     let config = Config {
         arguments: arguments.iter().map(Into::into).collect(),
         limits,
         ..config()
     };
-    Machine::boot(&config).expect("boots")
+    Vm::boot(&config).expect("boots")
 }
 
-/// Short limits, so that a test detects a hang soon. The boot keeps its own limit.
-fn short() -> Limits {
+/// Short limits, so that a test detects a hang soon. The limit of the boot stays.
+fn short_limits() -> Limits {
     Limits {
         answer: Duration::from_secs(1),
         ..Limits::default()
@@ -44,7 +44,7 @@ fn short() -> Limits {
 }
 
 #[test]
-fn the_registers_read_back_as_the_table_says() {
+fn the_registers_have_the_values_of_the_table() {
     let mut machine = boot();
     machine.send(Command::Show(FrameName::Number(0))).unwrap();
     let answer = machine.send(Command::Registers).unwrap();
@@ -71,11 +71,11 @@ fn the_registers_read_back_as_the_table_says() {
 }
 
 /// Returns the frames shown, late frames and ticks of the running demo, or `None` if the demo is held.
-fn pace(machine: &mut Machine) -> Option<[u32; 3]> {
+fn pace(machine: &mut Vm) -> Option<[u32; 3]> {
     let counts = machine.send(Command::Counts).unwrap();
     let pace = counts.iter().find(|line| line.starts_with("pace "))?;
-    let words: Vec<_> = pace.split(' ').collect();
-    Some([words[2], words[4], words[6]].map(|number| number.parse().unwrap()))
+    let fields: Vec<_> = pace.split(' ').collect();
+    Some([fields[2], fields[4], fields[6]].map(|number| number.parse().unwrap()))
 }
 
 /// Under `-icount` the machine's time is its number of instructions, so a busy host cannot slow it down:
@@ -101,7 +101,7 @@ fn each_tick_has_its_frame() {
 }
 
 #[test]
-fn the_running_show_paces_itself_and_can_be_held() {
+fn the_running_demo_keeps_its_pace_and_can_be_held() {
     let mut machine = boot();
     machine.wait_until_running().unwrap();
     // A busy host deprives the machine of time, so that ticks are lost; it never adds any. So among some
@@ -136,9 +136,9 @@ fn the_running_show_paces_itself_and_can_be_held() {
     machine.leave().unwrap();
 }
 
-/// Presses keys until the log has a change that ends in `change`, and returns the log. QEMU passes keys on with
-/// a delay, and drops those that do not fit its buffer.
-fn logged(machine: &mut Machine, change: &str, press: impl Fn(&mut Machine)) -> Vec<String> {
+/// Presses keys until the log has a change that ends in `change`, and returns the log. QEMU passes keys on
+/// with a delay, and drops those that do not fit its buffer.
+fn logged(machine: &mut Vm, change: &str, press: impl Fn(&mut Vm)) -> Vec<String> {
     for _ in 0..600 {
         press(machine);
         machine.rest(Duration::from_millis(50)).unwrap();
@@ -153,7 +153,7 @@ fn logged(machine: &mut Machine, change: &str, press: impl Fn(&mut Machine)) -> 
 /// Steers with keys and with commands. The log must then reproduce the frame on the screen, held, and on the
 /// emulated VGA too.
 #[test]
-fn a_steered_show_is_brought_back_by_its_log() {
+fn the_log_reproduces_the_frame_of_a_steered_demo() {
     let mut machine = boot();
     machine.wait_until_running().unwrap();
     // Keys held down, since QEMU's window sends repeats; more codes than the machine has room for.
@@ -223,27 +223,27 @@ fn a_steered_show_is_brought_back_by_its_log() {
     machine.leave().unwrap();
 }
 
-/// Makes the kernel fail, and returns the verdict.
-fn failure(kind: FailKind) -> Judged {
-    failure_within(Limits::default(), kind)
+/// Makes the kernel fail, and returns the failure.
+fn failure_by(fault: FailKind) -> ExpectedFailure {
+    failure_within(Limits::default(), fault)
 }
 
-fn failure_within(limits: Limits, kind: FailKind) -> Judged {
+fn failure_within(limits: Limits, fault: FailKind) -> ExpectedFailure {
     let mut machine = boot_with(&[], limits);
-    let judged = Judged(verdict(machine.send(Command::Fail(kind))));
-    let evidence = judged.0.evidence.as_deref().expect("evidence is kept");
+    let failure = ExpectedFailure::of(machine.send(Command::Fail(fault)));
+    let evidence = failure.evidence.as_deref().expect("evidence is kept");
     for name in ["command.txt", "serial.log", "screen.png"] {
-        let there = evidence.join(name).exists();
-        assert!(there, "{name} is missing in {}", evidence.display());
+        let exists = evidence.join(name).exists();
+        assert!(exists, "{name} is missing in {}", evidence.display());
     }
-    judged
+    failure
 }
 
 #[test]
-fn a_panic_is_told_with_its_place() {
-    let judged = failure(FailKind::Panic);
-    let Verdict::Panic { report } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+fn a_panic_is_reported_with_its_source_line() {
+    let failure = failure_by(FailKind::Panic);
+    let Verdict::Panic { report } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert!(
         report[0].starts_with("panic at kernel/src/machine.rs:"),
@@ -254,27 +254,26 @@ fn a_panic_is_told_with_its_place() {
 
 /// The line is locked and half written; the report must pass both.
 #[test]
-fn a_panic_in_the_middle_of_a_line_is_told_whole() {
-    let judged = failure(FailKind::PanicInLine);
-    let Verdict::Panic { report } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+fn a_panic_in_the_middle_of_a_line_is_reported_completely() {
+    let failure = failure_by(FailKind::PanicInLine);
+    let Verdict::Panic { report } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert_eq!(report[1], "'fail panic-in-line' requested this panic");
 }
 
 /// The kernel ends while commands are pending: its last message must still be read.
 #[test]
-fn a_panic_with_commands_under_way_is_told_whole() {
+fn a_panic_with_pending_commands_is_reported_completely() {
     let mut machine = boot();
     machine.send_raw(b"fail panic\ncounts\ncounts\n").unwrap();
-    let judged = Judged(verdict(machine.wait_for_end()));
-    let Verdict::Panic { report } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+    let failure = ExpectedFailure::of(machine.wait_for_end());
+    let Verdict::Panic { report } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert_eq!(report[1], "'fail panic' requested this panic");
     assert!(
-        judged
-            .0
+        failure
             .evidence
             .as_ref()
             .unwrap()
@@ -284,19 +283,19 @@ fn a_panic_with_commands_under_way_is_told_whole() {
 }
 
 #[test]
-fn a_reboot_loop_is_noticed() {
+fn a_reboot_loop_is_detected() {
     let mut config = config();
     config.arguments = vec!["-action".into(), "reboot=reset".into()];
-    let mut machine = Machine::boot(&config).unwrap();
-    let judged = Judged(verdict(machine.send(Command::Fail(FailKind::TripleFault))));
-    assert_eq!(judged.0.verdict, Verdict::TripleFault { booted: true });
+    let mut machine = Vm::boot(&config).unwrap();
+    let failure = ExpectedFailure::of(machine.send(Command::Fail(FailKind::TripleFault)));
+    assert_eq!(failure.verdict, Verdict::TripleFault { booted: true });
 }
 
 #[test]
-fn an_exception_is_told_with_its_registers() {
-    let judged = failure(FailKind::PageFault);
-    let Verdict::Exception { report } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+fn an_exception_is_reported_with_its_registers() {
+    let failure = failure_by(FailKind::PageFault);
+    let Verdict::Exception { report } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert_eq!(report[0], "exception page fault (vector 14)");
     assert!(report[1].ends_with("cr2 0000000000000040"), "{report:?}");
@@ -310,10 +309,10 @@ fn an_exception_is_told_with_its_registers() {
 }
 
 #[test]
-fn a_stack_overflow_has_its_name() {
-    let judged = failure(FailKind::StackOverflow);
-    let Verdict::Exception { report } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+fn a_stack_overflow_is_named_in_its_report() {
+    let failure = failure_by(FailKind::StackOverflow);
+    let Verdict::Exception { report } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert!(
         report[0].starts_with("exception stack overflow"),
@@ -322,44 +321,44 @@ fn a_stack_overflow_has_its_name() {
 }
 
 #[test]
-fn a_triple_fault_is_no_success() {
-    let judged = failure(FailKind::TripleFault);
-    assert_eq!(judged.0.verdict, Verdict::TripleFault { booted: false });
+fn a_triple_fault_is_a_failure() {
+    let failure = failure_by(FailKind::TripleFault);
+    assert_eq!(failure.verdict, Verdict::TripleFault { booted: false });
 }
 
 #[test]
-fn an_adapter_that_does_not_take_the_mode_is_named() {
-    let judged = failure(FailKind::Adapter);
-    let Verdict::Adapter { report } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+fn an_adapter_that_does_not_support_mode_x_is_reported_with_the_reason() {
+    let failure = failure_by(FailKind::Adapter);
+    let Verdict::Adapter { report } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert_eq!(
         report[0],
         "adapter does not support Mode X: the window at A0000h is not planar: at offset 0000 plane 0 \
          reads 54 after 51 was stored"
     );
-    assert_eq!(judged.0.verdict.exit_code(), 17);
+    assert_eq!(failure.verdict.exit_code(), 17);
 }
 
 #[test]
-fn a_hang_is_noticed() {
-    let judged = failure_within(short(), FailKind::Hang);
+fn a_machine_that_hangs_is_ended_by_the_watchdog() {
+    let failure = failure_within(short_limits(), FailKind::Hang);
     let waited_for = "the answer to 'fail hang'".into();
-    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+    assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
 
 /// The data fills the buffers, and then nobody reads them.
 #[test]
-fn a_kernel_that_does_not_read_hangs() {
-    let mut machine = boot_with(&[], short());
+fn a_kernel_that_does_not_read_is_ended_by_the_watchdog() {
+    let mut machine = boot_with(&[], short_limits());
     machine.send_raw(b"fail hang\n").unwrap();
-    let judged = Judged(verdict(machine.send_raw(&vec![b' '; 4 << 20])));
-    let waited_for = "the kernel's reading of what it is sent".into();
-    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+    let failure = ExpectedFailure::of(machine.send_raw(&vec![b' '; 4 << 20]));
+    let waited_for = "room in the kernel's serial buffer".into();
+    assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
 
 /// A machine, and QEMU's monitor, through which the test acts as a user at the window.
-fn boot_with_monitor(limits: Limits) -> (Machine, UnixStream) {
+fn boot_with_monitor(limits: Limits) -> (Vm, UnixStream) {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("monitor");
     let monitor = format!("unix:{},server=on,wait=off", socket.display());
@@ -370,17 +369,21 @@ fn boot_with_monitor(limits: Limits) -> (Machine, UnixStream) {
 /// Closing GTK's window quits QEMU, and its menu has the other two. `-no-reboot -no-shutdown` turns a reset
 /// into a machine that stands still, and the kernel does not notice a power button.
 #[test]
-fn a_machine_ended_at_the_window_is_the_users_doing() {
+fn a_machine_that_is_ended_at_the_window_is_ended_by_the_user() {
     for command in ["quit\n", "system_reset\n", "system_powerdown\n"] {
         let (machine, mut monitor) = boot_with_monitor(Limits::default());
         monitor.write_all(command.as_bytes()).unwrap();
-        assert_eq!(verdict(machine.watch()).verdict, Verdict::User, "{command}");
+        assert_eq!(
+            ExpectedFailure::of(machine.watch()).verdict,
+            Verdict::User,
+            "{command}"
+        );
     }
 }
 
 #[test]
-fn a_paused_machine_does_not_hang() {
-    let (mut machine, mut monitor) = boot_with_monitor(short());
+fn a_paused_machine_does_not_count_as_a_hang() {
+    let (mut machine, mut monitor) = boot_with_monitor(short_limits());
     monitor.write_all(b"stop\n").unwrap();
     machine.rest(Duration::from_secs(1)).unwrap();
     // Longer than the limit for an answer.
@@ -398,18 +401,21 @@ fn a_paused_machine_does_not_hang() {
 }
 
 #[test]
-fn a_pause_is_not_waited_for_without_end() {
+fn a_pause_has_a_time_limit() {
     let pause = Duration::from_secs(2);
-    let (mut machine, mut monitor) = boot_with_monitor(Limits { pause, ..short() });
+    let (mut machine, mut monitor) = boot_with_monitor(Limits {
+        pause,
+        ..short_limits()
+    });
     monitor.write_all(b"stop\n").unwrap();
     machine.rest(Duration::from_secs(1)).unwrap();
-    let judged = Judged(verdict(machine.send(Command::Hold)));
+    let failure = ExpectedFailure::of(machine.send(Command::Hold));
     let waited_for = "the answer to 'hold'".into();
-    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+    assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
 
 #[test]
-fn a_stop_in_the_boot_loader_names_what_was_found() {
+fn the_message_about_a_stopped_boot_loader_names_the_cause() {
     let soon = Duration::from_secs(5);
     let cases = [
         ("none", "", soon, false, &["display adapter"][..]),
@@ -425,7 +431,7 @@ fn a_stop_in_the_boot_loader_names_what_was_found() {
             "-m 16",
             soon,
             false,
-            &["has 16 MiB", "its screen says", "SECOND STAGE"],
+            &["has 16 MiB", "the text on the screen", "SECOND STAGE"],
         ),
         (
             "std",
@@ -435,19 +441,19 @@ fn a_stop_in_the_boot_loader_names_what_was_found() {
             &["no long mode"],
         ),
     ];
-    let check = |(vga, arguments, boot, resets, words): (&str, &str, _, _, &[&str])| {
+    let check = |(vga, arguments, boot, resets, expected): (&str, &str, _, _, &[&str])| {
         let mut config = config();
         config.vga = vga.into();
         config.arguments = arguments.split_whitespace().map(Into::into).collect();
         config.limits.boot = boot;
-        let judged = Judged(verdict(Machine::boot(&config)));
-        let said = judged.0.to_string();
-        let Verdict::BootLoader { reset, .. } = judged.0.verdict else {
-            panic!("{vga} {arguments}: {said}");
+        let failure = ExpectedFailure::of(Vm::boot(&config));
+        let message = failure.to_string();
+        let Verdict::BootLoader { reset, .. } = failure.verdict else {
+            panic!("{vga} {arguments}: {message}");
         };
-        assert_eq!(reset, resets, "{vga} {arguments}: {said}");
-        for word in words {
-            assert!(said.contains(word), "{vga} {arguments}: {said}");
+        assert_eq!(reset, resets, "{vga} {arguments}: {message}");
+        for text in expected {
+            assert!(message.contains(text), "{vga} {arguments}: {message}");
         }
     };
     // In parallel, because most of the time passes waiting.
@@ -459,7 +465,7 @@ fn a_stop_in_the_boot_loader_names_what_was_found() {
 }
 
 #[test]
-fn arguments_of_the_user_stand_beside_ours() {
+fn the_users_arguments_for_qemu_are_accepted() {
     let folder = tempfile::tempdir().unwrap();
     let disk = folder.path().join("empty.img");
     std::fs::write(&disk, vec![0; 1 << 20]).unwrap();
@@ -470,9 +476,9 @@ fn arguments_of_the_user_stand_beside_ours() {
 }
 
 #[test]
-fn a_list_of_qemus_is_printed_and_no_failure() {
+fn a_list_that_qemu_prints_is_printed_and_is_not_a_failure() {
     LazyLock::force(&READY);
-    for (arguments, words) in [
+    for (arguments, expected) in [
         ("-machine help", "q35"),
         ("-M help", "q35"),
         ("-cpu help", "qemu64"),
@@ -489,32 +495,32 @@ fn a_list_of_qemus_is_printed_and_no_failure() {
         let mut all = vec!["--headless", "--"];
         all.extend(arguments.split(' '));
         let output = crystal_ball(&all);
-        let [printed, said] =
+        let [stdout, stderr] =
             [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-        assert_eq!(output.status.code(), Some(0), "{arguments}: {said}");
-        assert!(printed.contains(words), "{arguments}: {printed}");
+        assert_eq!(output.status.code(), Some(0), "{arguments}: {stderr}");
+        assert!(stdout.contains(expected), "{arguments}: {stdout}");
     }
 }
 
 #[test]
-fn an_unknown_exit_is_qemus_failure_in_its_words() {
+fn a_failure_of_qemu_is_reported_with_its_output() {
     let mut config = config();
     config.vga = "nonsense".into();
-    let failure = verdict(Machine::boot(&config));
-    let Verdict::Qemu { words, .. } = &failure.verdict else {
+    let failure = ExpectedFailure::of(Vm::boot(&config));
+    let Verdict::Qemu { output, .. } = &failure.verdict else {
         panic!("{failure}");
     };
     assert!(
-        words.iter().any(|line| line.contains("nonsense")),
-        "{words:?}"
+        output.iter().any(|line| line.contains("nonsense")),
+        "{output:?}"
     );
 }
 
 #[test]
-fn a_killed_qemu_is_neither_success_nor_the_kernels_fault() {
+fn a_killed_qemu_is_a_failure_of_qemu() {
     let mut machine = boot();
     send_signal(Signal::KILL, machine.process());
-    let failure = verdict(
+    let failure = ExpectedFailure::of(
         machine
             .wait_until_running()
             .and_then(|()| machine.wait_for_end()),
@@ -526,10 +532,10 @@ fn a_killed_qemu_is_neither_success_nor_the_kernels_fault() {
 }
 
 #[test]
-fn a_qemu_ended_by_the_user_is_so_named() {
+fn a_qemu_that_a_signal_ends_is_ended_by_the_user() {
     let machine = boot();
     send_signal(Signal::TERM, machine.process());
-    let failure = verdict(machine.watch());
+    let failure = ExpectedFailure::of(machine.watch());
     assert_eq!(failure.verdict, Verdict::User);
 }
 
@@ -549,7 +555,7 @@ fn crystal_ball(arguments: &[&str]) -> Output {
 }
 
 #[test]
-fn without_a_display_a_frame_is_left_and_so_by_a_second_one_beside_it() {
+fn two_runs_at_once_without_a_display_each_leave_a_frame() {
     LazyLock::force(&READY);
     let arguments: [&[&str]; 2] = [&[], &["--scene", "cube", "--mapper", "within-1/4"]];
     let both = thread::scope(|scope| {
@@ -558,9 +564,9 @@ fn without_a_display_a_frame_is_left_and_so_by_a_second_one_beside_it() {
             .map(|run| run.join().unwrap())
     });
     let [ball, cube] = both.map(|output| {
-        let words = String::from_utf8_lossy(&output.stderr);
-        assert!(output.status.success(), "{words}");
-        assert!(words.contains("no display: "), "{words}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success(), "{stderr}");
+        assert!(stderr.contains("there is no display"), "{stderr}");
         String::from_utf8(output.stdout).unwrap()
     });
     assert!(
@@ -594,16 +600,16 @@ fn without_a_display_a_frame_is_left_and_so_by_a_second_one_beside_it() {
         };
         assert!(
             (0..3600).any(&mut is_of),
-            "the frame is none of the show's: {look:?}"
+            "no frame of the demo equals the PNG: {look:?}"
         );
     }
 }
 
 #[test]
-fn exit_codes_tell_the_verdicts_apart() {
+fn each_kind_of_failure_has_its_exit_code() {
     LazyLock::force(&READY);
-    for (arguments, code, words) in [
-        (&["--vga", "nonsense"][..], 15, "QEMU itself failed"),
+    for (arguments, code, expected) in [
+        (&["--vga", "nonsense"][..], 15, "QEMU failed"),
         (
             &[
                 "--vga",
@@ -620,14 +626,14 @@ fn exit_codes_tell_the_verdicts_apart() {
         (&["--no-such-flag"], 2, "unexpected argument"),
     ] {
         let output = crystal_ball(arguments);
-        let said = String::from_utf8_lossy(&output.stderr);
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {said}");
-        assert!(said.contains(words), "{arguments:?}: {said}");
+        let stderr = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(expected), "{arguments:?}: {stderr}");
     }
 }
 
 #[test]
-fn whatever_ends_the_program_ends_qemu() {
+fn qemu_ends_with_the_program_by_any_signal() {
     LazyLock::force(&READY);
     for (signal, code) in [
         (Signal::INT, Some(130)),

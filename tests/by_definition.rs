@@ -8,7 +8,7 @@ use frames::golden::{self, Golden};
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::coverage::inside;
 use oracle::depth;
-use oracle::solid::{self, Checker, Compared, Solid};
+use oracle::solid::{self, Solid, SolidChecker, SolidCounts};
 use oracle::texel::{affine, perspective};
 use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
@@ -34,12 +34,12 @@ fn pose(golden: &Golden) -> Pose {
 
 /// What the definitions allow at each pixel: the colours, and the number of polygons that cover it. Polygons
 /// that hide each other count as one.
-struct Expected {
+struct ExpectedFrame {
     colours: Vec<Vec<u8>>,
     covered: Vec<u8>,
 }
 
-impl fmt::Debug for Expected {
+impl fmt::Debug for ExpectedFrame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("an expected frame")
     }
@@ -79,9 +79,9 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
         .collect()
 }
 
-fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expected {
+fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> ExpectedFrame {
     let (background, convex) = (stage.background(), stage.is_convex());
-    let mut expected = Expected {
+    let mut expected = ExpectedFrame {
         colours: (0..WIDTH * HEIGHT)
             .map(|i| vec![background[i / WIDTH]])
             .collect(),
@@ -90,7 +90,7 @@ fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expec
     let mut seen = Vec::new();
     let nearest = depth::nearest(stage, pose);
     stage.at(pose).faces(|number, drawn| {
-        let drawn = drawn.expect("nothing legal is dropped");
+        let drawn = drawn.expect("no legal face is dropped");
         seen.push((number, drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });
     for (number, polygon, surface, anchors) in seen {
@@ -125,7 +125,7 @@ fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expec
 }
 
 /// Compares a frame's pixels with the expected ones.
-fn compare(name: &str, expected: &Expected, pixel: impl Fn(usize) -> u8) {
+fn compare(name: &str, expected: &ExpectedFrame, pixel: impl Fn(usize) -> u8) {
     for (i, (allowed, covered)) in expected.colours.iter().zip(&expected.covered).enumerate() {
         let (x, y) = (i % WIDTH, i / WIDTH);
         assert!(
@@ -143,7 +143,7 @@ fn compare(name: &str, expected: &Expected, pixel: impl Fn(usize) -> u8) {
 /// Compares only which pixels show the background; another test checks the texels.
 fn compare_coverage(
     name: &str,
-    expected: &Expected,
+    expected: &ExpectedFrame,
     background: &[u8],
     pixel: impl Fn(usize) -> u8,
 ) {
@@ -160,7 +160,7 @@ fn compare_coverage(
 }
 
 #[test]
-fn every_golden_is_what_the_oracle_draws() {
+fn the_oracle_draws_every_golden() {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = CATALOGUE[0].paint(&mut texels);
     let mut storage = in_place::boxed!(RenderMemory);
@@ -211,13 +211,13 @@ fn every_golden_is_what_the_oracle_draws() {
 #[test]
 fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     let mut random = seeded::generator();
-    let mut checker = Checker::default();
+    let mut checker = SolidChecker::default();
     let ball = Solid::ball();
     let mut compare = |solid: &Solid, pose: &Pose| {
         let compared = checker.by_sight(solid, pose);
         compared.unwrap_or_else(|wrong| panic!("{wrong}: {pose:?}"))
     };
-    let mut far = Compared::default();
+    let mut far = SolidCounts::default();
     let mut goldens = golden::find(&golden_folder()).unwrap();
     goldens.retain(|golden| scene(golden).name == "ball");
     for golden in goldens.iter().take(seeded::cases(goldens.len())) {
@@ -228,7 +228,7 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
         let distance = random.i32(66_000..furthest);
         far += compare(&ball, &solid::pose(&mut random, distance));
     }
-    let mut near = Compared::default();
+    let mut near = SolidCounts::default();
     for _ in 0..seeded::cases(60) {
         // Within 1/512 or 1/8 unit of a vertex along each axis; the near plane is at 1/512 unit.
         let reach = random.choice([128, 1 << 13]).unwrap();
@@ -240,7 +240,7 @@ fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
         near += compare(&seen.inside_out(), &pose);
     }
     for (name, compared) in [("from afar", &far), ("from nearby", &near)] {
-        let Compared {
+        let SolidCounts {
             pixels,
             changed,
             furthest,

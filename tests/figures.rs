@@ -6,7 +6,7 @@ use crystal_ball::golden_folder;
 use frames::backend::{self, Backend, EmulatedDemo};
 use frames::golden::{self, Findings, Golden, Transfer};
 use protocol::{Command, Content, FrameName};
-use qemu::{Config, Machine};
+use qemu::{Config, Vm};
 use setup::Options;
 
 use crate::ready;
@@ -32,13 +32,13 @@ fn figures() {
         setup::ready(&options).expect("the set-up, warm");
         set_ups.push(start.elapsed());
         let start = Instant::now();
-        let mut machine = Machine::boot(&config).expect("boots");
+        let mut machine = Vm::boot(&config).expect("boots");
         kernels.push(start.elapsed());
         machine.wait_until_running().expect("runs");
         frames.push(start.elapsed());
         machine.leave().expect("leaves");
         let start = Instant::now();
-        let mut machine = Machine::boot(&config).expect("boots");
+        let mut machine = Vm::boot(&config).expect("boots");
         verify(&goldens[..1], &mut emulated, &mut machine, Transfer::Bytes);
         verified.push(start.elapsed());
         machine.leave().expect("leaves");
@@ -51,7 +51,7 @@ fn figures() {
         spread(verified)
     );
 
-    let mut machine = Machine::boot(&config).expect("boots");
+    let mut machine = Vm::boot(&config).expect("boots");
     for (transfer, how) in [
         (Transfer::Checksums, "by checksum"),
         (Transfer::Bytes, "by every byte"),
@@ -82,7 +82,7 @@ fn figures() {
     }
     machine.leave().expect("leaves");
 
-    let mut machine = Machine::boot(&config).expect("boots");
+    let mut machine = Vm::boot(&config).expect("boots");
     machine.wait_until_running().expect("runs");
     machine.rest(WATCHED).expect("runs on");
     let counts = machine.send(Command::Counts).expect("answers");
@@ -90,8 +90,8 @@ fn figures() {
         .iter()
         .find(|line| line.starts_with("pace "))
         .expect("a pace");
-    let words: Vec<_> = pace.split(' ').collect();
-    let [shown, late] = [words[2], words[4]].map(|n| n.parse::<f64>().expect("a number"));
+    let fields: Vec<_> = pace.split(' ').collect();
+    let [shown, late] = [fields[2], fields[4]].map(|n| n.parse::<f64>().expect("a number"));
     println!(
         "frames within a tick (16.7 ms) of the one before, over {} s: {:.2} % ({shown} shown, {late} late)",
         WATCHED.as_secs(),
@@ -120,7 +120,7 @@ fn figures() {
 fn verify(
     goldens: &[Golden],
     emulated: &mut EmulatedDemo<'_>,
-    machine: &mut Machine,
+    machine: &mut Vm,
     transfer: Transfer,
 ) -> Duration {
     let start = Instant::now();

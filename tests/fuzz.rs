@@ -1,8 +1,8 @@
-//! Files in any state: whatever a user's model or an image's ramdisk contains, it is refused with a message
-//! or drawn, and nothing panics.
+//! Damaged files: every model of a user and every ramdisk of an image is either drawn or refused with a
+//! message, and no file causes a panic.
 //!
 //! Good files are changed at random, so that they pass the first checks and reach the later ones. The
-//! checksums of a model file and of a PNG's chunks are recomputed, or nothing behind the checksum would be reached.
+//! checksums of a model file and of a PNG's chunks are recomputed, because a wrong checksum ends the checks.
 //! Every accepted file is drawn. A refusal's message is short and contains no terminal control sequence.
 //! `cargo test` does this for about a second. `cargo fuzz-models` does it for two minutes, or
 //! `CRYSTAL_BALL_FUZZ_MINUTES`, from the seed `CRYSTAL_BALL_FUZZ_SEED`, or a fresh one.
@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 
 use fastrand::Rng;
 use frames::indexed::IndexedImage;
-use import::{Model, obj, solid, texture};
+use import::{Model, make_mesh, obj, texture};
 use in_place::InPlace;
 use model::{Arena, MAX_BYTES, ModelFile, Parts};
 use modex::PlanarBuffer;
@@ -26,26 +26,26 @@ use texmap::{Mapper, Texture};
 /// The offset of a model file's counts, after magic, version, length and checksum.
 const COUNTS: usize = 20;
 
-/// Prints the seed of a case that panicked.
-struct Case(u64);
+/// Prints the seed of a case if it panics.
+struct SeedReport(u64);
 
-impl Drop for Case {
+impl Drop for SeedReport {
     fn drop(&mut self) {
         if thread::panicking() {
-            eprintln!("this was the case of seed {}", self.0);
+            eprintln!("the case of seed {} panicked", self.0);
         }
     }
 }
 
 /// Memory for drawing, kept from case to case.
-struct Room {
+struct DrawMemory {
     arena: InPlace<Arena>,
     storage: InPlace<RenderMemory>,
     painted: Box<[u8; MAX_TEXELS]>,
     page: Box<PlanarBuffer>,
 }
 
-impl Room {
+impl DrawMemory {
     fn new() -> Self {
         Self {
             arena: in_place::boxed!(Arena),
@@ -121,16 +121,16 @@ fn objs() -> Vec<Vec<u8>> {
     ]
 }
 
-/// A model file from an OBJ, with a plain texture.
-fn packed(text: &[u8], frame: (u32, u32)) -> anyhow::Result<Vec<u8>> {
-    let (solid, layout) = solid(&obj::parse(text)?, frame)?;
+/// Returns a model file from an OBJ, with a plain texture.
+fn model_file(text: &[u8], image: (u32, u32)) -> anyhow::Result<Vec<u8>> {
+    let (mesh, layout) = make_mesh(&obj::parse(text)?, image)?;
     let (width, height) = layout.size();
     let texels = layout.cut(|i, j| (i ^ j) as u8);
     let parts = Parts {
         mesh: Mesh {
-            vertices: &solid.vertices,
-            corners: &solid.corners,
-            faces: &solid.faces,
+            vertices: &mesh.vertices,
+            corners: &mesh.corners,
+            faces: &mesh.faces,
             convex: false,
         },
         texture: Texture::new(&texels, width, height)?,
@@ -151,7 +151,7 @@ fn run(
 ) -> (u64, u64) {
     let (mut cases, mut accepted) = (0, 0);
     while more(cases) {
-        let guard = Case(first.wrapping_add(cases));
+        let guard = SeedReport(first.wrapping_add(cases));
         accepted += u64::from(case(&mut Rng::with_seed(guard.0)));
         cases += 1;
     }
@@ -188,7 +188,7 @@ fn number(random: &mut Rng) -> i32 {
 }
 
 /// Changes a model file; returns whether it was accepted nevertheless.
-fn model_file_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
+fn model_file_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) -> bool {
     let before = random.choice(good).unwrap();
     let mut bytes = before.clone();
     for _ in 0..random.usize(1..6) {
@@ -225,7 +225,7 @@ fn model_file_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool 
     }
     match ModelFile::parse(&bytes) {
         Ok(model_file) => {
-            room.draw(&model_file, random);
+            memory.draw(&model_file, random);
             true
         }
         Err(error) => {
@@ -243,7 +243,7 @@ fn check_message(error: &anyhow::Error) {
 }
 
 /// Changes an OBJ; returns whether it makes a model nevertheless, which is then drawn.
-fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
+fn obj_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) -> bool {
     const WORDS: [&str; 46] = [
         "0",
         "-0",
@@ -322,19 +322,19 @@ fn obj_case(good: &[Vec<u8>], room: &mut Room, random: &mut Rng) -> bool {
         }
     }
     let text = rewritten(lines.join(&b'\n'), random);
-    let frame = *random
+    let image = *random
         .choice(&[(16, 16), (1, 1), (5, 300), (8192, 1)])
         .unwrap();
     if random.u8(..16) == 0 {
         // The whole path, including the messages that name formats.
         return Model::new(&text, None).inspect_err(check_message).is_ok();
     }
-    match packed(&text, frame) {
+    match model_file(&text, image) {
         Ok(bytes) => {
             assert!(bytes.len() <= MAX_BYTES);
             let model_file =
                 ModelFile::parse(&bytes).expect("what is made of an OBJ is a good model file");
-            room.draw(&model_file, random);
+            memory.draw(&model_file, random);
             true
         }
         Err(error) => {
@@ -458,8 +458,8 @@ fn is_read(bytes: &[u8]) -> bool {
         let _ = IndexedImage::read_png(Cursor::new(bytes));
     }
     match texture::read(Cursor::new(bytes)) {
-        Ok(frame) => {
-            let (width, height) = frame.pixels.dimensions();
+        Ok(image) => {
+            let (width, height) = image.pixels.dimensions();
             assert!(width > 0 && height > 0);
             true
         }
@@ -508,20 +508,20 @@ fn pngs() -> Vec<Vec<u8>> {
 
 /// Runs all kinds, each until its `more` returns false.
 fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
-    let mut room = Room::new();
+    let mut memory = DrawMemory::new();
     let objs = objs();
     let model_files: Vec<_> = objs
         .iter()
-        .map(|text| packed(text, (16, 16)).unwrap())
+        .map(|text| model_file(text, (16, 16)).unwrap())
         .collect();
     let pngs = pngs();
     for bytes in &model_files {
-        room.draw(&ModelFile::parse(bytes).unwrap(), &mut Rng::with_seed(seed));
+        memory.draw(&ModelFile::parse(bytes).unwrap(), &mut Rng::with_seed(seed));
     }
     for png in &pngs {
         texture::read(Cursor::new(png)).unwrap();
     }
-    let mut tell = |kind: &str, case: &mut dyn FnMut(&mut Rng) -> bool| {
+    let mut report = |kind: &str, case: &mut dyn FnMut(&mut Rng) -> bool| {
         let begun = Instant::now();
         let (cases, accepted) = run(seed, |cases| more(kind, cases), case);
         eprintln!(
@@ -534,27 +534,27 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
         let some = accepted * 100 > cases && accepted < cases;
         assert!(some || cases < 1000, "{kind}");
     };
-    tell("model files", &mut |random| {
-        model_file_case(&model_files, &mut room, random)
+    report("model files", &mut |random| {
+        model_file_case(&model_files, &mut memory, random)
     });
-    tell("OBJs", &mut |random| obj_case(&objs, &mut room, random));
-    tell("PNGs", &mut |random| png_case(&pngs, random));
-    tell("PNGs' chunks", &mut |random| chunks_case(&pngs, random));
+    report("OBJs", &mut |random| obj_case(&objs, &mut memory, random));
+    report("PNGs", &mut |random| png_case(&pngs, random));
+    report("PNGs' chunks", &mut |random| chunks_case(&pngs, random));
 }
 
 #[test]
-fn nothing_in_any_state_panics() {
+fn no_damaged_file_causes_a_panic() {
     let (seed, most) = (seeded::generator().get_seed(), seeded::cases(2000) as u64);
     all(seed, |_, cases| cases < most);
 }
 
 #[test]
 #[ignore = "minutes: cargo fuzz-models"]
-fn nothing_in_any_state_panics_for_minutes() {
+fn no_damaged_file_causes_a_panic_for_minutes() {
     let number = |name: &str, default| match std::env::var(name) {
         Ok(text) => text
             .parse()
-            .unwrap_or_else(|_| panic!("{name} is no number: {text}")),
+            .unwrap_or_else(|_| panic!("{name}: '{text}' is not a number")),
         Err(_) => default,
     };
     let minutes: f64 = number("CRYSTAL_BALL_FUZZ_MINUTES", 2.0);

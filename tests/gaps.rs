@@ -1,9 +1,9 @@
 //! Why edges are integers: reproduces and counts the gaps of the Black Book's figure 57.1.
 //!
 //! The figure is a turned sheet of quadrilaterals. Its fields alternate between two methods of finding edges:
-//! integers from whole-pixel vertices, and 16.16 fixed point from the exact vertices. Each method would do on
-//! its own; where the two meet, pixels are left out and others are written twice. Beside it is the same sheet
-//! as this project draws it, every field by one exact rule.
+//! integers from whole-pixel vertices, and 16.16 fixed point from the exact vertices. Each method alone would
+//! leave no gap; where the two meet, pixels are left out and others are written twice. Beside it is the same
+//! sheet as this project draws it, every field by one exact rule.
 //!
 //! `cargo gaps` writes `docs/gaps.png`.
 
@@ -21,12 +21,12 @@ const FIELDS: (i32, i32) = (9, 7);
 const SIDE: f64 = 23.7;
 
 /// How often each pixel was written, and the kind of field that wrote it last.
-struct Page {
+struct WriteCounts {
     times: Vec<u8>,
     kind: Vec<u8>,
 }
 
-impl Page {
+impl WriteCounts {
     fn new() -> Self {
         Self {
             times: vec![0; WIDTH * HEIGHT],
@@ -105,8 +105,8 @@ fn by_rows(corners: [(f64, f64); 4], mut scan: impl FnMut(i32, i32, i32)) {
 }
 
 /// The sheet with the two methods of finding edges.
-fn mixed() -> Page {
-    let mut page = Page::new();
+fn mixed() -> WriteCounts {
+    let mut page = WriteCounts::new();
     for (corners, kind) in sheet() {
         // Integers only: the vertices are rounded to whole pixels first.
         let corners = match kind {
@@ -123,7 +123,7 @@ fn mixed() -> Page {
 }
 
 /// Passes columns on to a page in RAM, and counts each pixel.
-struct Noted<'a>(&'a mut Page, u8, PlanarBuffer);
+struct Noted<'a>(&'a mut WriteCounts, u8, PlanarBuffer);
 
 impl Destination for Noted<'_> {
     fn select(&mut self, _: u16) {}
@@ -144,8 +144,8 @@ impl Destination for Noted<'_> {
 }
 
 /// The sheet as the renderer draws it.
-fn exact() -> Page {
-    let mut page = Page::new();
+fn exact() -> WriteCounts {
+    let mut page = WriteCounts::new();
     let textures = [Texture::DOT];
     for (corners, kind) in sheet() {
         let polygon = corners.map(|(x, y)| Vertex {
@@ -170,7 +170,7 @@ fn exact() -> Page {
 }
 
 #[test]
-fn mixed_edges_leave_gaps_and_exact_ones_do_not() {
+fn mixed_edges_leave_gaps_and_exact_edges_do_not() {
     let (gaps, doubles) = mixed().faults();
     assert!(gaps > 50 && doubles > 50, "{gaps} gaps, {doubles} doubles");
     assert_eq!(exact().faults(), (0, 0));
@@ -178,7 +178,7 @@ fn mixed_edges_leave_gaps_and_exact_ones_do_not() {
 
 #[test]
 #[ignore = "writes docs/gaps.png; run it by `cargo gaps`"]
-fn frame() {
+fn both_sheets_are_drawn_side_by_side() {
     const BACKGROUND: u8 = 0;
     const GAP: u8 = 3;
     const DOUBLE: u8 = 4;
@@ -212,19 +212,19 @@ fn frame() {
     }
     for (name, page) in ["mixed", "exact"].iter().zip(&pages) {
         let (gaps, doubles) = page.faults();
-        println!("{name}: {gaps} pixels left out, {doubles} written twice");
+        println!("{name}: {gaps} pixels missing, {doubles} written twice");
     }
     // Each pixel two by two, so that a missing pixel is visible.
     let wide = pixels.chunks(2 * WIDTH).flat_map(|row| {
         let row: Vec<u8> = row.iter().flat_map(|&pixel| [pixel; 2]).collect();
         [row.clone(), row].concat()
     });
-    let frame = IndexedImage {
+    let image = IndexedImage {
         width: 4 * WIDTH,
         height: 2 * HEIGHT,
         palette,
         pixels: wide.collect(),
     };
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/gaps.png");
-    frame.write_png(File::create(path).unwrap()).unwrap();
+    image.write_png(File::create(path).unwrap()).unwrap();
 }

@@ -14,7 +14,7 @@ use frames::backend::{self, Backend, EmulatedDemo};
 use frames::difference::Capture;
 use frames::golden::{self, Findings, Golden, Transfer};
 use protocol::{Command, Content, FrameName};
-use qemu::{Config, Machine};
+use qemu::{Config, Vm};
 use setup::Ready;
 use tempfile::TempDir;
 use texmap::{Mapper, Order};
@@ -41,7 +41,7 @@ fn conclude(findings: Findings, test: &str) {
 }
 
 #[test]
-fn emulated_card_draws_every_golden() {
+fn the_emulated_vga_draws_every_golden() {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let mut findings = Findings::default();
@@ -82,10 +82,10 @@ const BYTE_BY_BYTE: [&str; 11] = [
 ];
 
 #[test]
-fn qemu_shows_and_holds_every_golden() {
+fn qemu_draws_and_shows_every_golden() {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
-    let mut machine = Machine::boot(&config()).unwrap();
+    let mut machine = Vm::boot(&config()).unwrap();
     let mut findings = Findings::default();
     for golden in goldens() {
         let transfer = if BYTE_BY_BYTE.contains(&golden.name.as_str()) {
@@ -114,7 +114,7 @@ fn kind_of_scene(golden: &Golden) -> &'static str {
 }
 
 #[test]
-fn goldens_sent_byte_by_byte_are_of_every_kind() {
+fn goldens_that_are_sent_byte_by_byte_cover_every_kind() {
     let all = goldens();
     let sent = |golden: &&Golden| BYTE_BY_BYTE.contains(&golden.name.as_str());
     assert_eq!(all.iter().filter(sent).count(), BYTE_BY_BYTE.len());
@@ -195,7 +195,7 @@ pub fn with_arguments(ready: &Ready, vga: &str, arguments: &str) -> Config {
 /// # Errors
 /// If the boot fails, or goldens differ.
 pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
-    let mut machine = Machine::boot(config)?;
+    let mut machine = Vm::boot(config)?;
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory)?;
     let mut findings = Findings::default();
@@ -209,7 +209,7 @@ pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
 /// Evidence that must be equal for every boot: all of video memory after three frames, and the counts of
 /// drawing them.
 pub fn evidence(config: &Config) -> anyhow::Result<Vec<String>> {
-    let mut machine = Machine::boot(config)?;
+    let mut machine = Vm::boot(config)?;
     machine.show(&[0, 480, u32::MAX].map(FrameName::Number))?;
     let mut evidence = machine.send(Command::Checksums(Content::Memory))?;
     evidence.extend(machine.send(Command::Counts)?);
@@ -230,7 +230,7 @@ pub fn emulated_evidence() -> Vec<String> {
 }
 
 #[test]
-fn counted_instructions_change_no_byte() {
+fn instruction_counting_changes_no_byte() {
     let counting = with_arguments(&READY, "std", "-icount shift=0");
     assert_eq!(evidence(&counting).unwrap(), emulated_evidence());
 }
@@ -256,7 +256,7 @@ fn found(folder: &Path) -> Vec<String> {
 }
 
 #[test]
-fn missing_and_wrong_goldens_are_found_by_folder() {
+fn missing_wrong_and_stray_files_in_a_golden_folder_are_found() {
     let copy = two_goldens();
     let at = |name: &str| copy.path().join(name);
     assert_eq!(found(copy.path()), [""; 0]);
@@ -274,14 +274,14 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
     let wrong = found(copy.path());
     assert!(wrong[0].contains("the PNG is missing"), "{wrong:?}");
     // An orphan, an invalid description, an unrelated file, an empty folder.
-    let refused = |words: &str| {
+    let refused = |reason: &str| {
         let error = format!("{:#}", golden::find(copy.path()).unwrap_err());
-        assert!(error.contains(words), "{error}");
+        assert!(error.contains(reason), "{error}");
     };
     std::fs::remove_file(at("north.toml")).unwrap();
     refused("north.png: the description north.toml is missing");
     std::fs::remove_file(at("north.png")).unwrap();
-    for (description, words) in [
+    for (description, reason) in [
         ("about = \"a\"", "missing field `show`"),
         ("about = \"a\"\nshow = []", "`show` is empty"),
         ("about = \"a\"\nshow = [\"x\"]", "'x' is not a frame's name"),
@@ -292,7 +292,7 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
         ("belt", "belt.toml: not a valid description of a golden"),
     ] {
         std::fs::write(at("belt.toml"), description).unwrap();
-        refused(words);
+        refused(reason);
     }
     std::fs::write(at("belt.txt"), "").unwrap();
     std::fs::remove_file(at("belt.toml")).unwrap();
@@ -303,7 +303,7 @@ fn missing_and_wrong_goldens_are_found_by_folder() {
 
 /// The wrong frame is found even if it is as similar as possible to the right one.
 #[test]
-fn the_wrong_frame_is_found() {
+fn a_golden_with_the_wrong_frame_is_found() {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let mut dump = |frame| {
@@ -321,7 +321,7 @@ fn the_wrong_frame_is_found() {
 
 /// Runs the program: it prints and shows the changes, boots QEMU, and writes the PNGs.
 #[test]
-fn a_blessing_tells_what_changes_and_makes_the_goldens() {
+fn bless_lists_the_changes_and_writes_the_goldens() {
     LazyLock::force(&READY);
     let copy = two_goldens();
     let at = |name: &str| copy.path().join(name);
@@ -331,17 +331,17 @@ fn a_blessing_tells_what_changes_and_makes_the_goldens() {
     let bless = || {
         let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
         let output = program.arg("bless").arg(copy.path()).output().unwrap();
-        let words = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.success(), "{words}");
-        words
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{stderr}");
+        stderr
     };
-    let words = bless();
+    let stderr = bless();
     for line in [
         "belt: expected the golden, got the new frame: ",
         "new: new: A new one.",
         "2 golden frames blessed",
     ] {
-        assert!(words.contains(line), "{words}");
+        assert!(stderr.contains(line), "{stderr}");
     }
     assert_eq!(std::fs::read(at("belt.png")).unwrap(), good);
     assert_eq!(found(copy.path()), [""; 0]);
@@ -350,10 +350,10 @@ fn a_blessing_tells_what_changes_and_makes_the_goldens() {
 
 /// Finds a stray write anywhere: on a hidden page, after the last page, in another plane.
 #[test]
-fn all_of_video_memory_is_as_the_emulated_card_has_it() {
+fn all_of_video_memory_equals_the_emulated_vgas() {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
-    let mut machine = Machine::boot(&config()).unwrap();
+    let mut machine = Vm::boot(&config()).unwrap();
     let frames = [0, 100, 200, 4_000_000_000, 300].map(FrameName::Number);
     emulated.show(&frames).unwrap();
     machine.show(&frames).unwrap();
@@ -376,15 +376,15 @@ fn all_of_video_memory_is_as_the_emulated_card_has_it() {
 
 /// Runs the program: `dump` and `emulate` write files with the same bytes, and `diff` confirms it.
 #[test]
-fn emulate_writes_what_dump_writes() {
+fn emulate_and_dump_write_the_same_files() {
     LazyLock::force(&READY);
     let folder = tempfile::tempdir().unwrap();
     let crystal_ball = |arguments: &[&str]| {
         let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
         let output = program.args(arguments).current_dir(&folder).output();
         let output = output.unwrap();
-        let words = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.success(), "{arguments:?}: {words}");
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{arguments:?}: {stderr}");
         String::from_utf8(output.stdout).unwrap()
     };
     let pose = "--pose 0 c0000000 20000000 1b333";
@@ -395,10 +395,10 @@ fn emulate_writes_what_dump_writes() {
         for (command, out) in [("dump", "a"), ("emulate", "b")] {
             let mut arguments = vec![command, "--out", out];
             arguments.extend(which.split(' '));
-            let told = crystal_ball(&arguments);
+            let paths = crystal_ball(&arguments);
             assert!(
-                told.lines().all(|path| folder.path().join(path).exists()),
-                "{told}"
+                paths.lines().all(|path| folder.path().join(path).exists()),
+                "{paths}"
             );
         }
     }
@@ -427,12 +427,12 @@ fn emulate_writes_what_dump_writes() {
 
 /// A write to the card, one byte at a time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Write {
+enum CardWrite {
     Port(u16, u8),
     Memory(u16, u8),
 }
 
-impl Write {
+impl CardWrite {
     /// Parses a line of QEMU's trace; `None` for another device.
     fn traced(line: &str) -> Option<Self> {
         let hex = |name: &str| {
@@ -466,14 +466,15 @@ impl Write {
 }
 
 /// Compares QEMU's own record of every write with the emulated VGA's log. Neither the kernel nor this project
-/// made that record, so it proves without the kernel's word that each column needs only one Map Mask write.
+/// made that record, so it proves, without trust in the kernel, that each column needs only one Map Mask
+/// write.
 #[test]
-fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
+fn qemus_trace_of_a_frame_equals_the_emulated_vgas_log() {
     let folder = tempfile::tempdir().unwrap();
     let trace = folder.path().join("trace");
     let mut config = config();
     config.arguments = vec!["-D".into(), trace.clone().into()];
-    let mut machine = Machine::boot(&config).unwrap();
+    let mut machine = Vm::boot(&config).unwrap();
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     // The fourth frame erases what the first left on its page.
@@ -493,20 +494,20 @@ fn qemus_trace_of_a_frame_is_the_emulated_cards_log() {
     emulated.vga().start_log();
     emulated.send(show).unwrap();
     let log = emulated.vga().take_log();
-    let logged: Vec<_> = log.iter().flat_map(Write::logged).collect();
+    let logged: Vec<_> = log.iter().flat_map(CardWrite::logged).collect();
     let text = std::fs::read_to_string(&trace).unwrap();
-    let traced: Vec<_> = text.lines().filter_map(Write::traced).collect();
+    let traced: Vec<_> = text.lines().filter_map(CardWrite::traced).collect();
     for (i, (traced, logged)) in traced.iter().zip(&logged).enumerate() {
         assert_eq!(
             traced, logged,
             "write {i} of QEMU's trace and of the emulated card's log"
         );
     }
-    assert_eq!(traced.len(), logged.len(), "one of the two goes on");
+    assert_eq!(traced.len(), logged.len(), "one of the two has more writes");
     // 3C4h index 2 is Map Mask: one write to erase, and one for each column drawn.
     let map_masks = traced
         .windows(2)
-        .filter(|pair| matches!(pair, [Write::Port(0x3C4, 2), Write::Port(0x3C5, _)]));
+        .filter(|pair| matches!(pair, [CardWrite::Port(0x3C4, 2), CardWrite::Port(0x3C5, _)]));
     let counts = emulated.send(Command::Counts).unwrap();
     let mut columns = counts[0].split(' ').skip_while(|word| *word != "columns");
     let columns: usize = columns.nth(1).unwrap().parse().unwrap();

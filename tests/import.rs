@@ -106,28 +106,28 @@ fn emulate(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Option<Ve
     let out = folder.join("dumps");
     let _ = fs::remove_dir_all(&out);
     let all = [&["emulate", "--frame", "0"][..], arguments].concat();
-    let (code, words) = run(folder, &all);
+    let (code, stderr) = run(folder, &all);
     let unsafe_byte = |byte: u8| byte < b' ' && byte != b'\n' || byte == 0x7f;
-    assert!(!words.bytes().any(unsafe_byte), "{words:?}");
+    assert!(!stderr.bytes().any(unsafe_byte), "{stderr:?}");
     // The limit is the length of the longest intended message: a message never repeats much of a file.
-    assert!(words.lines().all(|line| line.len() < 400), "{words}");
-    (code, words, fs::read(out.join("frame-000000.dump")).ok())
+    assert!(stderr.lines().all(|line| line.len() < 400), "{stderr}");
+    (code, stderr, fs::read(out.join("frame-000000.dump")).ok())
 }
 
 #[test]
-fn a_cube_is_the_same_however_it_is_written() {
+fn a_cube_is_drawn_alike_from_every_spelling_of_its_file() {
     let folder = files();
     let path = folder.path();
     let shown = |text: &[u8]| {
         fs::write(path.join("a.obj"), text).unwrap();
-        let (code, words, frame) = emulate(path, &["--model", "a.obj"]);
-        assert_eq!(code, Some(0), "{words}");
-        (words, frame.expect("a frame was written"))
+        let (code, stderr, frame) = emulate(path, &["--model", "a.obj"]);
+        assert_eq!(code, Some(0), "{stderr}");
+        (stderr, frame.expect("a frame was written"))
     };
     let (plain, frame) = shown(CUBE.as_bytes());
     assert_eq!(
         plain.lines().next(),
-        Some("a.obj: 8 vertices, 6 faces, texture of our own 256 x 256")
+        Some("a.obj: 8 vertices, 6 faces, built-in texture 256 x 256")
     );
     assert!(!plain.contains("note: "), "{plain}");
     let normal = |index: &str| CUBE.replace("/1 ", &format!("/1/{index} "));
@@ -143,14 +143,15 @@ fn a_cube_is_the_same_however_it_is_written() {
         normal("99"),
         format!("{CUBE}v 1.#QNAN0 0x10 1,5\nvt x\n"),
     ] {
-        let (words, same) = shown(text.as_bytes());
-        assert_eq!(words, plain, "{text:?}");
+        let (stderr, same) = shown(text.as_bytes());
+        assert_eq!(stderr, plain, "{text:?}");
         assert!(same == frame, "{text:?}");
     }
     let tagged = format!("t crease 2/1/0 1 2 2.0\nvw 1\n{CUBE}\x1b[31m 1\nvw 2\nl 1 2\n");
-    let (words, same) = shown(tagged.as_bytes());
-    let left_out = r"6 faces, 5 statements left out (1 't', 2 'vw', 1 '\x1b[31m', 1 'l'), texture";
-    assert!(words.contains(left_out), "{words}");
+    let (stderr, same) = shown(tagged.as_bytes());
+    let left_out =
+        r"6 faces, 5 statements skipped (1 't', 2 'vw', 1 '\x1b[31m', 1 'l'), built-in texture";
+    assert!(stderr.contains(left_out), "{stderr}");
     assert!(same == frame);
     // By name, too.
     let (code, _, same) = emulate(path, &["--model", "a.obj", "--scene", "model"]);
@@ -171,7 +172,7 @@ fn faces_that_look_away_are_reported_with_the_winding_rule() {
         lines.collect::<String>()
     };
     let sheet = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nf 1 2 3 4\n";
-    for (text, said) in [
+    for (text, expected) in [
         (sheet.to_string(), None),
         (CUBE.to_string(), None),
         (
@@ -186,13 +187,13 @@ fn faces_that_look_away_are_reported_with_the_winding_rule() {
         (format!("{}f 1 2 3 4\n", turned(sheet)), None),
     ] {
         fs::write(path.join("a.obj"), &text).unwrap();
-        let (code, words, _) = emulate(path, &["--model", "a.obj"]);
-        assert_eq!(code, Some(0), "{words}");
-        let note = words.lines().find(|line| line.starts_with("note: "));
-        assert_eq!(note.is_some(), said.is_some(), "{words}");
-        if let (Some(note), Some(said)) = (note, said) {
+        let (code, stderr, _) = emulate(path, &["--model", "a.obj"]);
+        assert_eq!(code, Some(0), "{stderr}");
+        let note = stderr.lines().find(|line| line.starts_with("note: "));
+        assert_eq!(note.is_some(), expected.is_some(), "{stderr}");
+        if let (Some(note), Some(expected)) = (note, expected) {
             assert!(
-                note.starts_with(said) && note.contains("counter-clockwise"),
+                note.starts_with(expected) && note.contains("counter-clockwise"),
                 "{note}"
             );
         }
@@ -200,7 +201,7 @@ fn faces_that_look_away_are_reported_with_the_winding_rule() {
 }
 
 #[test]
-fn what_hides_under_transparency_is_not_drawn() {
+fn colours_under_full_transparency_are_not_drawn() {
     let folder = files();
     let path = folder.path();
     fs::write(path.join("a.obj"), CUBE).unwrap();
@@ -216,14 +217,14 @@ fn what_hides_under_transparency_is_not_drawn() {
     write("clear.png", [255, 0, 255, 0]);
     write("grey.png", [128, 128, 128, 255]);
     let [clear, grey] = ["clear.png", "grey.png"].map(|texture| {
-        let (code, words, frame) = emulate(path, &["--model", "a.obj", "--texture", texture]);
-        assert_eq!(code, Some(0), "{words}");
-        (words, frame.unwrap())
+        let (code, stderr, frame) = emulate(path, &["--model", "a.obj", "--texture", texture]);
+        assert_eq!(code, Some(0), "{stderr}");
+        (stderr, frame.unwrap())
     });
     assert!(
         clear
             .0
-            .contains("64 x 64, transparent parts drawn over grey (808080)"),
+            .contains("64 x 64, transparent parts blended with grey (808080)"),
         "{}",
         clear.0
     );
@@ -232,7 +233,7 @@ fn what_hides_under_transparency_is_not_drawn() {
 }
 
 #[test]
-fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
+fn unusable_files_are_refused_with_file_line_and_reason_and_nothing_is_written() {
     let folder = files();
     let path = folder.path();
     let png = fs::read(path.join("thing.png")).unwrap();
@@ -256,7 +257,7 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
             b"hello\n",
             "1: 'hello' is not a statement of a Wavefront OBJ",
         ),
-        ("binary.obj", b"v 0 0 0\n\0\0", " it has no faces"),
+        ("binary.obj", b"v 0 0 0\n\0\0", " the file has no faces"),
         (
             "escape.obj",
             b"\x1b[31mEVIL\x1b[0m 1 2\n",
@@ -280,45 +281,37 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
         (
             "page.obj",
             page.as_bytes(),
-            " its content is HTML, not a Wavefront OBJ",
+            " the file is HTML, not a Wavefront OBJ",
         ),
         (
             "ascii.obj",
             b"solid a\n facet normal 0 0 1\n",
-            " its content is STL, not",
+            " the file is STL, not",
         ),
-        ("stl.obj", &stl, " its content is binary STL, not"),
+        ("stl.obj", &stl, " the file is binary STL, not"),
         (
             "ply.obj",
             b"ply\nformat ascii 1.0\n",
-            " its content is PLY, not",
+            " the file is PLY, not",
         ),
-        (
-            "gltf.obj",
-            b"{\n\"asset\": {}}",
-            " its content is JSON, not",
-        ),
-        (
-            "zip.obj",
-            b"PK\x03\x04\x14\0\0\0",
-            " its content is ZIP, not",
-        ),
+        ("gltf.obj", b"{\n\"asset\": {}}", " the file is JSON, not"),
+        ("zip.obj", b"PK\x03\x04\x14\0\0\0", " the file is ZIP, not"),
         (
             "fbx.obj",
             b"Kaydara FBX Binary  \0\x1a\0",
-            " its content is FBX, not",
+            " the file is FBX, not",
         ),
         (
             "png.obj",
             &png,
-            " its content is PNG, not a Wavefront OBJ; a frame goes behind --texture",
+            " the file is PNG, not a Wavefront OBJ; pass an image with --texture",
         ),
         (
             "wide.obj",
             &marked,
-            " its content is UTF-16 text, not a Wavefront OBJ; save it as UTF-8",
+            " the file is UTF-16 text, not a Wavefront OBJ; save it as UTF-8",
         ),
-        ("unmarked.obj", &wide, " its content is UTF-16 text, not"),
+        ("unmarked.obj", &wide, " the file is UTF-16 text, not"),
         (
             "index.obj",
             b"v 0 0 0\nv 1 0 0\nf 1 2 3\n",
@@ -327,18 +320,18 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
         (
             "back.obj",
             b"v 0 0 0\nf -1 -2 -1\n",
-            "2: '-2': the position -2 does not exist: 1 come",
+            "2: '-2': the position -2 does not exist: the file has 1",
         ),
         (
             "nan.obj",
             b"v 0 0 0\n\nv 0 nan 0\nf 1 2 1",
             "3: 'nan' is not within",
         ),
-        ("empty.obj", b"# nothing\n", " it has no faces"),
+        ("empty.obj", b"# nothing\n", " the file has no faces"),
         (
             "flat.obj",
             b"v 0 0 0\nv 1 0 0\nf 1 2 1\nf 1 2\n",
-            " none of its 2 faces has an area",
+            " none of the 2 faces has an area",
         ),
         (
             "faces.obj",
@@ -358,112 +351,108 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
     ];
     for (name, bytes, why) in objs {
         fs::write(path.join(name), bytes).unwrap();
-        let (code, words, _) = emulate(path, &["--model", name]);
-        assert_eq!(code, Some(1), "{words}");
+        let (code, stderr, _) = emulate(path, &["--model", name]);
+        assert_eq!(code, Some(1), "{stderr}");
         assert!(
-            words.starts_with(&format!("error: {name}:{why}")),
-            "{words}"
+            stderr.starts_with(&format!("error: {name}:{why}")),
+            "{stderr}"
         );
-        assert!(words.contains("; "), "it says what to do: {words}");
+        assert!(stderr.contains("; "), "no remedy in: {stderr}");
     }
     let pngs: &[(&str, &[u8], &str)] = &[
         (
             "no.png",
             b"GIF89a, or so",
-            "its content is GIF, not PNG; convert it to PNG",
+            "the file is GIF, not a PNG; convert it to PNG",
         ),
         (
             "jpeg.png",
             b"\xff\xd8\xff\xe0\0\x10JFIF\0",
-            "its content is JPEG, not PNG;",
+            "the file is JPEG, not a PNG;",
         ),
         (
             "webp.png",
             b"RIFF\x10\0\0\0WEBPVP8 ",
-            "its content is WebP, not PNG;",
+            "the file is WebP, not a PNG;",
         ),
         (
             "tiff.png",
             b"II*\0\x08\0\0\0",
-            "its content is TIFF, not PNG;",
+            "the file is TIFF, not a PNG;",
         ),
         (
             "svg.png",
             b"<svg xmlns='http://www.w3.org/2000/svg'/>",
-            "its content is SVG, not PNG;",
+            "the file is SVG, not a PNG;",
         ),
         (
             "obj.png",
             b"v 0 0 0\n\x1b[2J",
-            r"it begins with 'v 0 0 0\x0a\x1b[2J', not as a PNG;",
+            r"the file begins with 'v 0 0 0\x0a\x1b[2J', unlike every PNG;",
         ),
-        ("none.png", b"", "it is empty; "),
-        ("cut.png", &png[..png.len() / 2], "it is not a whole PNG: "),
-        ("head.png", &png[..30], "it is not a whole PNG: "),
-        ("zero.png", &empty_png(0, 5), "it is not a whole PNG: "),
-        ("palette-1.png", &palette_png(1), "it is not a whole PNG: "),
+        ("none.png", b"", "the file is empty; "),
+        ("cut.png", &png[..png.len() / 2], "the PNG is damaged: "),
+        ("head.png", &png[..30], "the PNG is damaged: "),
+        ("zero.png", &empty_png(0, 5), "the PNG is damaged: "),
+        ("palette-1.png", &palette_png(1), "the PNG is damaged: "),
         (
             "palette-4.png",
             &palette_png(4),
-            "its palette has 4 bytes, not three",
+            "the palette has 4 bytes, but needs three",
         ),
         (
             "palette-767.png",
             &palette_png(767),
-            "its palette has 767 bytes, not three",
+            "the palette has 767 bytes, but needs three",
         ),
-        (
-            "palette-771.png",
-            &palette_png(771),
-            "it is not a whole PNG: ",
-        ),
+        ("palette-771.png", &palette_png(771), "the PNG is damaged: "),
         (
             "wide.png",
             &empty_png(20_000, 1),
-            "it has 20000 x 1 pixels, and a texture has at most 8192 a side",
+            "the PNG has 20000 x 1 pixels, but at most 8192 on a side are allowed",
         ),
         (
             "high.png",
             &empty_png(20_000, 20_000),
-            "it has 20000 x 20000 pixels",
+            "the PNG has 20000 x 20000 pixels",
         ),
     ];
     for (name, bytes, why) in pngs {
         fs::write(path.join(name), bytes).unwrap();
-        let (code, words, _) = emulate(path, &["--model", "thing.obj", "--texture", name]);
-        assert_eq!(code, Some(1), "{words}");
+        let (code, stderr, _) = emulate(path, &["--model", "thing.obj", "--texture", name]);
+        assert_eq!(code, Some(1), "{stderr}");
         assert!(
-            words.starts_with(&format!("error: {name}: {why}")),
-            "{words}"
+            stderr.starts_with(&format!("error: {name}: {why}")),
+            "{stderr}"
         );
         assert_eq!(
-            words.matches("not PNG").count(),
-            usize::from(why.contains("not PNG")),
-            "{words}"
+            stderr.matches("not a PNG").count(),
+            usize::from(why.contains("not a PNG")),
+            "{stderr}"
         );
     }
     for bytes in [3, 768] {
         fs::write(path.join("good.png"), palette_png(bytes)).unwrap();
-        let (code, words, frame) =
+        let (code, stderr, frame) =
             emulate(path, &["--model", "thing.obj", "--texture", "good.png"]);
-        assert!(code == Some(0) && frame.is_some(), "{words}");
+        assert!(code == Some(0) && frame.is_some(), "{stderr}");
     }
     fs::remove_dir_all(path.join("dumps")).unwrap();
     for (arguments, code, why) in [
         (
             &["--model", "gone.obj"][..],
             1,
-            "error: gone.obj: it cannot be read: No such file",
+            "error: gone.obj: cannot be read: No such file",
         ),
         (
             &["--model", "\x1b[31mgone\n.obj"],
             1,
-            r"error: \x1b[31mgone\x0a.obj: it cannot be read: No such file",
+            r"error: \x1b[31mgone\x0a.obj: cannot be read: No such file",
         ),
         (
             &["--model", "."],
             1,
-            "error: .: it cannot be read: Is a directory",
+            "error: .: cannot be read: Is a directory",
         ),
         (
             &["--texture", "thing.png"],
@@ -476,9 +465,9 @@ fn what_is_no_model_is_told_by_file_line_and_reason_and_nothing_is_written() {
             "--scene model needs a model; add --model FILE.obj",
         ),
     ] {
-        let (ended, words, _) = emulate(path, arguments);
-        assert_eq!(ended, Some(code), "{words}");
-        assert!(words.contains(why), "{words}");
+        let (ended, stderr, _) = emulate(path, arguments);
+        assert_eq!(ended, Some(code), "{stderr}");
+        assert!(stderr.contains(why), "{stderr}");
     }
     assert!(!path.join("dumps").exists(), "something was written");
 }
@@ -498,11 +487,11 @@ fn interrupted(signal: Signal, feed: impl FnOnce(fs::File) -> Option<fs::File>) 
         .expect("the program can be started");
     let open = feed(fs::File::options().write(true).open(&pipe).unwrap());
     rustix::process::kill_process(Pid::from_child(&process), signal).unwrap();
-    let mut words = String::new();
-    let mut said = process.stderr.take().unwrap();
-    said.read_to_string(&mut words).unwrap();
+    let mut text = String::new();
+    let mut stderr = process.stderr.take().unwrap();
+    stderr.read_to_string(&mut text).unwrap();
     assert_eq!(
-        (process.wait().unwrap().code(), &words[..]),
+        (process.wait().unwrap().code(), &text[..]),
         (Some(130), "interrupted\n")
     );
     drop(open);
@@ -514,7 +503,7 @@ fn interrupted(signal: Signal, feed: impl FnOnce(fs::File) -> Option<fs::File>) 
 }
 
 #[test]
-fn interrupts_are_heard_while_a_model_is_read_and_while_it_is_made() {
+fn an_interrupt_ends_the_import_while_it_reads_and_while_it_works() {
     // The pipe stays open: more data could follow.
     interrupted(Signal::TERM, |mut pipe| {
         pipe.write_all(CUBE.as_bytes()).unwrap();
@@ -530,7 +519,7 @@ fn interrupts_are_heard_while_a_model_is_read_and_while_it_is_made() {
 }
 
 #[test]
-fn bytes_of_dumps_and_descriptions_are_escaped() {
+fn messages_escape_unprintable_bytes_of_dumps_and_descriptions() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path();
     let evil = "\x1b]0;title\x07";
@@ -556,9 +545,9 @@ fn bytes_of_dumps_and_descriptions_are_escaped() {
         (&["bless", "keys"], 1, r"'\x1b[31m' is not a frame's name"),
         (&["--scene", evil], 2, "for '--scene <NAME>'"),
     ] {
-        let (ended, words) = run(path, arguments);
-        assert_eq!(ended, Some(code), "{words}");
-        assert!(words.contains(why), "{words}");
-        assert!(!words.contains(['\x1b', '\x07']), "{words:?}");
+        let (ended, stderr) = run(path, arguments);
+        assert_eq!(ended, Some(code), "{stderr}");
+        assert!(stderr.contains(why), "{stderr}");
+        assert!(!stderr.contains(['\x1b', '\x07']), "{stderr:?}");
     }
 }

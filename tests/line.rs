@@ -13,16 +13,16 @@ use std::time::Duration;
 use frames::backend::{self, Backend, EmulatedDemo};
 use frames::dump::Dump;
 use protocol::{Command, Content, FrameName};
-use qemu::{Config, Limits, Machine, Verdict};
+use qemu::{Config, Limits, Verdict, Vm};
 
-use crate::judged::{Judged, verdict};
+use crate::expected_failure::ExpectedFailure;
 use crate::ready::config;
 
 /// Alters a line from the kernel; the line includes its end.
 type Alter = Box<dyn FnMut(&[u8]) -> Vec<u8> + Send>;
 
 /// A machine whose serial line passes through `alter`.
-fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Machine {
+fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Vm {
     let config = Config {
         arguments: arguments.into_iter().map(Into::into).collect(),
         limits,
@@ -33,7 +33,7 @@ fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Machine {
         thread::spawn(move || pass_on(kernel, tap, alter));
         host
     };
-    let mut machine = Machine::boot_through(&config, tap).expect("boots");
+    let mut machine = Vm::boot_through(&config, tap).expect("boots");
     machine.show(&[FrameName::Number(480)]).expect("shows");
     machine
 }
@@ -86,11 +86,6 @@ fn dump_altered_within(
     Ok(dump)
 }
 
-#[track_caller]
-fn judged(outcome: anyhow::Result<Dump>) -> Judged {
-    Judged(verdict(outcome))
-}
-
 /// The bytes of a dump as the kernel sent them, and the dump that the machine made of them.
 fn recorded() -> (Vec<u8>, Dump) {
     let (send, sent) = mpsc::channel();
@@ -110,10 +105,10 @@ fn recorded() -> (Vec<u8>, Dump) {
 }
 
 /// Alters a line, given its number.
-type Step = fn(usize, &[u8]) -> Vec<u8>;
+type LineFault = fn(usize, &[u8]) -> Vec<u8>;
 
 /// Recorded bytes after `step`, which sees the lines from `line 100` on.
-fn altered(recorded: &[u8], step: Step) -> Vec<u8> {
+fn altered(recorded: &[u8], step: LineFault) -> Vec<u8> {
     let first = recorded
         .split_inclusive(|&byte| byte == b'\n')
         .position(|line| line.starts_with(b"line 100 "))
@@ -128,10 +123,10 @@ fn altered(recorded: &[u8], step: Step) -> Vec<u8> {
 
 /// One boot sends a dump; the test then alters its bytes in every way that could happen.
 #[test]
-fn whatever_happens_to_a_dump_is_noticed_and_named() {
+fn every_kind_of_damage_to_a_dump_is_detected_and_named() {
     let (bytes, dump) = recorded();
     assert_eq!(Dump::read(&bytes).unwrap(), dump);
-    let faults: [(&str, Step, &str); 8] = [
+    let faults: [(&str, LineFault, &str); 8] = [
         (
             "a flipped bit",
             |n, line| {
@@ -197,32 +192,32 @@ fn whatever_happens_to_a_dump_is_noticed_and_named() {
             "cut short: expected 'end'",
         ),
     ];
-    for (fault, step, words) in faults {
+    for (fault, step, expected) in faults {
         let wrong = Dump::read(&altered(&bytes, step)).expect_err(fault);
-        assert!(wrong.why.contains(words), "{fault}: {wrong}");
+        assert!(wrong.why.contains(expected), "{fault}: {wrong}");
     }
 }
 
 /// A fault in a single line is the run's verdict; in the next test no single line shows the fault.
 #[test]
 fn a_garbled_dump_ends_the_run() {
-    let judged = judged(dump_altered(|n, line| {
+    let failure = ExpectedFailure::of(dump_altered(|n, line| {
         let mut line = line.to_vec();
         if n == 100 {
             line[40] ^= 1;
         }
         line
     }));
-    let Verdict::Garbled { why } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+    let Verdict::Garbled { why } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert!(why.contains("the line has checksum"), "{why}");
 }
 
 #[test]
-fn swapped_lines_are_told_by_their_numbers() {
+fn swapped_lines_are_detected_by_their_numbers() {
     let mut kept = Vec::new();
-    let judged = judged(dump_altered(move |n, line| match n {
+    let failure = ExpectedFailure::of(dump_altered(move |n, line| match n {
         100 => {
             kept = line.to_vec();
             Vec::new()
@@ -230,8 +225,8 @@ fn swapped_lines_are_told_by_their_numbers() {
         101 => [line, &kept].concat(),
         _ => line.to_vec(),
     }));
-    let words = judged.0.to_string();
-    assert!(words.contains("expected 'line 100', found"), "{words}");
+    let message = failure.to_string();
+    assert!(message.contains("expected 'line 100', found"), "{message}");
 }
 
 /// The changes that a terminal makes to line ends have no effect.
@@ -246,19 +241,19 @@ fn line_ends_of_a_terminal_are_accepted() {
 }
 
 #[test]
-fn a_hang_in_the_middle_of_a_dump_is_a_hang() {
+fn a_hang_in_the_middle_of_a_dump_is_reported_as_a_hang() {
     let limits = Limits {
         answer: Duration::from_secs(1),
         ..Limits::default()
     };
-    let judged = judged(dump_altered_within(limits, |_, _| Vec::new()));
+    let failure = ExpectedFailure::of(dump_altered_within(limits, |_, _| Vec::new()));
     let waited_for = "the answer to 'dump'".into();
-    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+    assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
 
 /// A non-maskable interrupt, for which the kernel knows no reason, arrives between two lines.
 #[test]
-fn a_crash_in_the_middle_of_a_dump_is_told_with_its_registers() {
+fn a_crash_in_the_middle_of_a_dump_is_reported_as_an_exception() {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("monitor");
     let monitor = format!("unix:{},server=on,wait=off", socket.display());
@@ -273,9 +268,9 @@ fn a_crash_in_the_middle_of_a_dump_is_told_with_its_registers() {
     };
     let arguments = vec!["-monitor".into(), monitor];
     let mut machine = tapped(arguments, Limits::default(), Box::new(alter));
-    let judged = judged(machine.dump(Content::Page));
-    let Verdict::Exception { report } = &judged.0.verdict else {
-        panic!("{}", judged.0);
+    let failure = ExpectedFailure::of(machine.dump(Content::Page));
+    let Verdict::Exception { report } = &failure.verdict else {
+        panic!("{}", failure);
     };
     assert_eq!(report[0], "exception non-maskable interrupt (vector 2)");
 }
@@ -285,19 +280,19 @@ fn a_crash_in_the_middle_of_a_dump_is_told_with_its_registers() {
 fn strike(monitor: &Path) {
     let mut monitor = UnixStream::connect(monitor).unwrap();
     monitor.write_all(b"nmi\n").unwrap();
-    let mut said = Vec::new();
+    let mut output = Vec::new();
     let mut bytes = [0; 256];
     // The prompt after the command's echo.
-    while said.windows(6).filter(|text| text == b"(qemu)").count() < 2 {
+    while output.windows(6).filter(|text| text == b"(qemu)").count() < 2 {
         let count = monitor.read(&mut bytes).unwrap();
-        assert!(count > 0, "the monitor is gone");
-        said.extend_from_slice(&bytes[..count]);
+        assert!(count > 0, "the monitor has closed the connection");
+        output.extend_from_slice(&bytes[..count]);
     }
 }
 
 /// Nobody reads for a while: the kernel waits, and then everything arrives in order.
 #[test]
-fn a_host_that_stops_reading_is_waited_for() {
+fn the_kernel_waits_for_a_host_that_stops_reading() {
     let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
     let mut waits = true;
     let alter = move |line: &[u8]| {
@@ -330,8 +325,8 @@ fn a_host_that_stops_reading_is_waited_for() {
 }
 
 #[test]
-fn noise_on_the_line_is_answered_and_survived() {
-    let mut machine = Machine::boot(&config()).unwrap();
+fn noise_on_the_line_is_answered_and_harmless() {
+    let mut machine = Vm::boot(&config()).unwrap();
     machine.send(Command::Hold).unwrap();
     for (noise, reason) in [
         (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
@@ -366,7 +361,7 @@ fn noise_on_the_line_is_answered_and_survived() {
 /// Sends a flood of invalid lines. Each gets an answer, and the frame does not change.
 #[test]
 fn a_flood_of_noise_changes_no_byte() {
-    let mut machine = Machine::boot(&config()).unwrap();
+    let mut machine = Vm::boot(&config()).unwrap();
     machine.show(&[FrameName::Number(7)]).unwrap();
     let before = machine.send(Command::Checksums(Content::Memory)).unwrap();
     let mut state = seeded::generator().get_seed() << 1 | 1;
@@ -403,7 +398,7 @@ fn a_flood_of_noise_changes_no_byte() {
 
 /// An endless flood of lines that are not the answer: the wait still ends.
 #[test]
-fn a_flood_of_the_kernels_ends_in_a_hang() {
+fn an_endless_flood_of_lines_without_an_answer_is_reported_as_a_hang() {
     let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
     let tap = |kernel: UnixStream| {
         let (tap, host) = UnixStream::pair().unwrap();
@@ -420,7 +415,7 @@ fn a_flood_of_the_kernels_ends_in_a_hang() {
         });
         host
     };
-    let mut machine = Machine::boot_through(&config(), tap).unwrap();
+    let mut machine = Vm::boot_through(&config(), tap).unwrap();
     // From here on the kernel sends nothing that could come between two lines of the flood.
     machine.wait_until_running().unwrap();
     machine.set_limits(Limits {
@@ -428,7 +423,7 @@ fn a_flood_of_the_kernels_ends_in_a_hang() {
         ..Limits::default()
     });
     go.send(()).unwrap();
-    let judged = Judged(verdict(machine.answer("nothing")));
+    let failure = ExpectedFailure::of(machine.answer("nothing"));
     let waited_for = "the answer to 'nothing'".into();
-    assert_eq!(judged.0.verdict, Verdict::Hang { waited_for });
+    assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }

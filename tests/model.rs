@@ -6,7 +6,7 @@ use frames::backend::{self, Backend, EmulatedDemo};
 use frames::rgb::RgbImage;
 use import::Model;
 use protocol::{Command, Content, FrameName, Setting, Word};
-use qemu::{Config, Machine};
+use qemu::{Config, Vm};
 use setup::Options;
 use tempfile::TempDir;
 
@@ -47,9 +47,9 @@ fn model() -> Model {
     Model::load(&obj, Some(&png)).unwrap()
 }
 
-/// A machine whose ramdisk contains these bytes. If `model_file` is a checksum, the machine must accept the model file
-/// with it.
-fn boot(ramdisk: Vec<u8>, model_file: Option<u32>) -> Machine {
+/// A machine whose ramdisk contains these bytes. If `model_file` is a checksum, the machine must accept the
+/// model file with it.
+fn boot(ramdisk: Vec<u8>, model_file: Option<u32>) -> Vm {
     let options = Options {
         ramdisk: Some(ramdisk),
         ..Options::default()
@@ -59,11 +59,11 @@ fn boot(ramdisk: Vec<u8>, model_file: Option<u32>) -> Machine {
         model_file,
         ..Config::new(&ready)
     };
-    Machine::boot(&config).expect("boots")
+    Vm::boot(&config).expect("boots")
 }
 
 #[test]
-fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
+fn qemu_and_the_emulated_vga_draw_a_model_alike_and_name_it_in_their_dumps() {
     let model = model();
     let model_file = model.file();
     let mut machine = boot(model.bytes.clone(), Some(model_file.checksum()));
@@ -80,11 +80,11 @@ fn a_model_is_shown_by_both_cards_alike_and_named_in_their_dumps() {
         },
     ];
     for frame in frames {
-        let [seen, told]: [_; 2] =
+        let [real, emulated_dump]: [_; 2] =
             [&mut machine as &mut dyn Asked, &mut emulated].map(|card| card.dump_of(frame));
-        assert_eq!(seen, told, "{frame}");
-        assert_eq!(seen.header.scene, "model");
-        assert_eq!(seen.header.model_file, Some(model_file.checksum()));
+        assert_eq!(real, emulated_dump, "{frame}");
+        assert_eq!(real.header.scene, "model");
+        assert_eq!(real.header.model_file, Some(model_file.checksum()));
         assert_eq!(machine.screen().unwrap(), emulated.screen().unwrap());
     }
     // A built-in scene is no loaded model, whatever the ramdisk contains.
@@ -120,16 +120,16 @@ impl<C: Backend> Asked for C {
 }
 
 #[test]
-fn a_damaged_ramdisk_is_told_and_the_built_in_scenes_are_there() {
+fn a_damaged_model_file_is_reported_and_the_built_in_scenes_still_work() {
     let mut bytes = model().bytes;
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
     let mut machine = boot(bytes, None);
     machine.wait_until_running().unwrap();
-    let said = machine.said_of_pack().unwrap().to_string();
+    let answer = machine.model_answer().unwrap().to_string();
     assert!(
-        said.starts_with("refused model: the header states checksum "),
-        "{said}"
+        answer.starts_with("refused model: its header says checksum "),
+        "{answer}"
     );
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();

@@ -1,5 +1,5 @@
 //! Shows that checks can fail: those of the emulated VGA, of the Mode X driver, of coverage, of mappers that
-//! keep to an error and of visible spans. Run by `cargo named-mutants`.
+//! stay within an error and of visible spans. CargoRun by `cargo named-mutants`.
 //!
 //! A mutant is a plausible mistake that is planted into a copy of the workspace: in the driver, in the
 //! emulated VGA that should detect the driver's mistakes, or in the renderer. The tests of the affected
@@ -135,7 +135,7 @@ const MUTANTS: &[Mutant] = &[
         "self.latched = self.latched.or(self.start_address());"),
     mutant("CRTC protect ignored", CRTC,
         "if index <= 7 && protected {", "if false && index <= 7 && protected {"),
-    mutant("CRTC protect told, and the write taken", CRTC,
+    mutant("CRTC protection reported, but the write done", CRTC,
         "            // The chip drops the write, but for CR7 bit 4.\n",
         "            self.registers[usize::from(index)] = Some(value);\n"),
     mutant("off by one in scan lines", MONITOR,
@@ -155,7 +155,7 @@ const MUTANTS: &[Mutant] = &[
         self.write = Some(next(entry, part));
         match value {
             0..=0xFF => Ok(()),"),
-    mutant("8-bit DAC, told", DAC,
+    mutant("8-bit DAC, reported", DAC,
         "Some(value & 0x3F);", "Some(value);"),
     mutant("DAC read index does not step", DAC,
         "self.read = Some(next(entry, part));", ""),
@@ -175,11 +175,11 @@ const MUTANTS: &[Mutant] = &[
         "Some(UNCHAINED) => Ok(()),", "Some(_) => Ok(()),"),
     mutant("reset of the sequencer not seen", SEQUENCER,
         "!= Some(RUNNING) {", "== None {"),
-    mutant("store to a page that is seen not noticed", CRTC,
+    mutant("store to the displayed page not detected", CRTC,
         "[old, self.start_address()]", "[None, self.start_address()]"),
-    mutant("store to a page that will be seen not noticed", CRTC,
+    mutant("store to the page that is displayed next not detected", CRTC,
         "[old, self.start_address()]", "[old, None]"),
-    mutant("DISPI not noticed", VGA,
+    mutant("DISPI not detected", VGA,
         "dispi: true,", "dispi: false,"),
     mutant("faults forgotten with the card", VGA,
         "if !self.faults.is_empty() && ", "if false && "),
@@ -265,7 +265,7 @@ impl Mutant {
 const LIMIT: Duration = Duration::from_secs(300);
 
 #[test]
-fn every_mutant_has_its_place_in_the_source() {
+fn the_text_of_every_mutant_occurs_once_in_the_source() {
     let wrong: Vec<_> = MUTANTS
         .iter()
         .filter_map(|mutant| {
@@ -279,15 +279,15 @@ fn every_mutant_has_its_place_in_the_source() {
 #[test]
 #[ignore = "builds and tests for minutes, once for each mutant; by `cargo named-mutants`"]
 fn every_mutant_is_killed() {
-    let copy = Copy::new();
+    let copy = WorkspaceCopy::new();
     for packages in [CARD, MAPPER, SEEN] {
         let run = copy.cargo(&["test"], packages);
-        assert!(run.well, "without a mutant:\n{}", run.output);
+        assert!(run.succeeded, "without a mutant:\n{}", run.output);
     }
     let (mut survivors, mut errors) = (Vec::new(), Vec::new());
     for (i, mutant) in (1..).zip(MUTANTS) {
         let fate = copy.fate(mutant);
-        let told = match &fate {
+        let result = match &fate {
             Fate::Killed(tests) => match tests.len() {
                 1 => format!("killed by {}", tests[0]),
                 n => format!("killed by {} and {} more", tests[0], n - 1),
@@ -295,7 +295,7 @@ fn every_mutant_is_killed() {
             Fate::Survived => "SURVIVED".to_owned(),
             Fate::Error(error) => format!("ERROR: {error}"),
         };
-        println!("{i}/{} {}: {told}", MUTANTS.len(), mutant.name);
+        println!("{i}/{} {}: {result}", MUTANTS.len(), mutant.name);
         match fate {
             Fate::Killed(_) => {}
             Fate::Survived => survivors.push(mutant.name),
@@ -318,17 +318,17 @@ enum Fate {
 }
 
 /// A copy of the workspace, with a separate target folder that all mutants share.
-struct Copy {
+struct WorkspaceCopy {
     folder: TempDir,
 }
 
-/// Whether a run of cargo succeeded, and its output.
-struct Run {
-    well: bool,
+/// The result of a run of cargo.
+struct CargoRun {
+    succeeded: bool,
     output: String,
 }
 
-impl Copy {
+impl WorkspaceCopy {
     /// Copies the files that git tracks or would add, in their present state.
     fn new() -> Self {
         let mut git = Command::new("git");
@@ -377,13 +377,13 @@ impl Copy {
         };
         let built = self.cargo(&["test", "--no-run"], packages);
         let tested = built
-            .well
+            .succeeded
             .then(|| self.cargo(&["test", "--no-fail-fast"], packages));
         fs::write(&file, source).unwrap();
         let Some(tested) = tested else {
             return Fate::Error(format!("it does not compile:\n{}", built.output));
         };
-        if tested.well {
+        if tested.succeeded {
             return Fate::Survived;
         }
         let killers: Vec<_> = tested.output.lines().filter_map(failed).collect();
@@ -394,9 +394,9 @@ impl Copy {
     }
 
     /// Runs cargo in the copy, on two crates.
-    fn cargo(&self, arguments: &[&str], packages: [&str; 2]) -> Run {
-        let told = self.folder.path().join("output");
-        let output = File::create(&told).unwrap();
+    fn cargo(&self, arguments: &[&str], packages: [&str; 2]) -> CargoRun {
+        let path = self.folder.path().join("output");
+        let output = File::create(&path).unwrap();
         let mut cargo = child::family(env!("CARGO"));
         cargo
             .args(arguments)
@@ -425,12 +425,12 @@ impl Copy {
             }
             std::thread::sleep(Duration::from_millis(10));
         };
-        let mut output = fs::read_to_string(told).unwrap();
+        let mut output = fs::read_to_string(path).unwrap();
         if status.is_none() {
             output.push_str("\nstopped: it took too long\n");
         }
-        Run {
-            well: status.is_some_and(|status| status.success()),
+        CargoRun {
+            succeeded: status.is_some_and(|status| status.success()),
             output,
         }
     }

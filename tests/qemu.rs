@@ -4,9 +4,9 @@
 //! `cargo test --test qemu golden::` runs the tests of one module.
 
 mod boot;
+mod expected_failure;
 mod figures;
 mod golden;
-mod judged;
 mod line;
 mod measure;
 mod model;

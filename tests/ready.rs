@@ -18,9 +18,9 @@ pub fn with(options: &Options) -> Ready {
         // Not with `eprintln!`, whose output libtest keeps until the test has ended.
         let _ = writeln!(
             std::io::stderr(),
-            "\n\nerror: these tests boot a machine, and the set-up for that failed: {error:#}\n\n\
-             `cargo run -- doctor` lists what is there and what is missing. \
-             `cargo test --no-fail-fast` runs the tests that need none of it.\n"
+            "\n\nerror: the set-up for the tests that boot a machine failed: {error:#}\n\n\
+             `cargo run -- doctor` lists the parts that exist and the parts that are missing. \
+             `cargo test --no-fail-fast` runs the tests that need no set-up.\n"
         );
         std::process::exit(1);
     })

@@ -1,10 +1,10 @@
-//! The set-up from the outside, good and bad cases, in isolated worlds: a process with its own cache, home,
-//! target folder and `PATH`, where small shell scripts stand in for rustup, apt-get, cargo and QEMU. So the
-//! tests touch nothing of the user's, a whole set-up lasts a quarter of a second, and failures can be
-//! provoked at will.
+//! The set-up from the outside, with success and failure, in sandboxes. A sandbox is a process with a
+//! separate cache, home, target folder and `PATH`, where small shell scripts replace rustup, apt-get, cargo
+//! and QEMU. So the tests do not touch the user's files, a complete set-up lasts a quarter of a second, and a
+//! test can provoke any failure.
 //!
 //! The real steps (packages from the archive, compilers, minutes of building) use the same code. The first
-//! `cargo test` on a new machine runs them, and so does `real_set_up_recovers_from_kills`, by hand:
+//! `cargo test` on a new machine runs them, and so does `a_real_set_up_continues_after_a_kill`, by hand:
 //! `cargo test --test setup -- --ignored real`.
 
 use std::env;
@@ -21,7 +21,7 @@ use setup::Options;
 use system::Interrupted;
 use tempfile::TempDir;
 
-/// The variable that names the action of the process of [`in_a_world`].
+/// The variable that names the action of the process of [`in_a_sandbox`].
 const DO: &str = "CRYSTAL_BALL_TEST_DO";
 
 /// The tools that the scripts may call.
@@ -73,43 +73,43 @@ case $1 in
 esac
 "#;
 
-/// A place where a set-up can run and change nothing else.
-struct World {
+/// A folder in which a set-up can run without a change to anything else.
+struct Sandbox {
     folder: TempDir,
     /// Uses this machine's programs and the user's environment: only the cache and the target are separate.
     real: bool,
 }
 
-impl World {
-    /// A world where cargo, rustup and QEMU work; apt-get is missing.
+impl Sandbox {
+    /// Returns a sandbox where cargo, rustup and QEMU work; apt-get is missing.
     fn new() -> Self {
-        let world = Self::empty(false);
-        fs::create_dir(world.path("bin")).unwrap();
+        let sandbox = Self::empty(false);
+        fs::create_dir(sandbox.path("bin")).unwrap();
         let path = env::var_os("PATH").unwrap();
         for tool in TOOLS {
             let mut places = env::split_paths(&path).map(|folder| folder.join(tool));
             let real = places.find(|place| place.exists()).unwrap();
-            symlink(real, world.path("bin").join(tool)).unwrap();
+            symlink(real, sandbox.path("bin").join(tool)).unwrap();
         }
-        world.program("rustup", &format!("{TOOLCHAIN}{RUSTUP}"));
-        world.program("cargo", CARGO);
-        world.program("qemu-system-x86_64", QEMU);
-        world
+        sandbox.program("rustup", &format!("{TOOLCHAIN}{RUSTUP}"));
+        sandbox.program("cargo", CARGO);
+        sandbox.program("qemu-system-x86_64", QEMU);
+        sandbox
     }
 
-    /// A world without programs, except this test's program in the target folder, as if it had been built
-    /// there.
+    /// Returns a sandbox without programs, except this test's program in the target folder, as if it had been
+    /// built there.
     fn empty(real: bool) -> Self {
-        let world = Self {
+        let sandbox = Self {
             folder: tempfile::tempdir().unwrap(),
             real,
         };
         for folder in ["home", "cache", "target", "tmp"] {
-            fs::create_dir(world.path(folder)).unwrap();
+            fs::create_dir(sandbox.path(folder)).unwrap();
         }
-        fs::write(world.path("target/.rustc_info.json"), "").unwrap();
-        fs::copy(env::current_exe().unwrap(), world.path("target/setup")).unwrap();
-        world
+        fs::write(sandbox.path("target/.rustc_info.json"), "").unwrap();
+        fs::copy(env::current_exe().unwrap(), sandbox.path("target/setup")).unwrap();
+        sandbox
     }
 
     fn path(&self, name: &str) -> PathBuf {
@@ -168,10 +168,10 @@ esac"#;
         fs::remove_file(self.path("bin").join(program)).unwrap();
     }
 
-    /// A command that does `what` in this world.
+    /// Returns a command that does `what` in this sandbox.
     fn command(&self, what: &str) -> Command {
         let mut command = Command::new(self.path("target/setup"));
-        command.args(["--exact", "in_a_world", "--ignored", "--nocapture"]);
+        command.args(["--exact", "in_a_sandbox", "--ignored", "--nocapture"]);
         if !self.real {
             command.env_clear().env("HOME", self.path("home"));
             // Not below the user's home, where settings of cargo may be.
@@ -191,12 +191,12 @@ esac"#;
         command
     }
 
-    fn does(&self, what: &str) -> Said {
-        Said::from(self.command(what).output().unwrap())
+    fn run(&self, what: &str) -> Outcome {
+        Outcome::from(self.command(what).output().unwrap())
     }
 
     /// Checks that everything is in place, and nothing else.
-    fn is_whole(&self) {
+    fn assert_complete(&self) {
         assert_eq!(
             fs::read_to_string(self.image()).unwrap(),
             "the kernel\n in an image\n"
@@ -205,11 +205,15 @@ esac"#;
             self.cache("toolchain-1.96.0/lib/rustlib/src/rust/library/core/src/lib.rs")
                 .exists()
         );
-        assert_eq!(entries(&self.cache("aside")), 0, "something is left aside");
+        assert_eq!(
+            entries(&self.cache("temporary")),
+            0,
+            "a temporary folder is left"
+        );
         assert_eq!(
             entries(&self.cache("")),
             5,
-            "lock, aside, toolchain, image maker, cargo's home"
+            "lock, temporary folders, toolchain, image maker, cargo's home"
         );
     }
 }
@@ -238,12 +242,12 @@ fn entries(folder: &Path) -> usize {
 
 /// The exit code and the messages of a set-up.
 #[derive(Debug)]
-struct Said {
+struct Outcome {
     code: Option<i32>,
     text: String,
 }
 
-impl From<Output> for Said {
+impl From<Output> for Outcome {
     fn from(output: Output) -> Self {
         Self {
             code: output.status.code(),
@@ -252,31 +256,31 @@ impl From<Output> for Said {
     }
 }
 
-impl Said {
+impl Outcome {
     #[track_caller]
-    fn well(self) -> Self {
+    fn succeeded(self) -> Self {
         assert_eq!(self.code, Some(0), "{}", self.text);
         self
     }
 
-    /// Checks that it failed with all these words.
+    /// Checks that the set-up failed and that its messages contain all these texts.
     #[track_caller]
-    fn badly(self, words: &[&str]) -> Self {
+    fn failed(self, texts: &[&str]) -> Self {
         assert_eq!(self.code, Some(1), "{}", self.text);
-        self.saying(words)
+        self.with_text(texts)
     }
 
     #[track_caller]
-    fn saying(self, words: &[&str]) -> Self {
-        for word in words {
-            assert!(self.text.contains(word), "no {word:?} in:\n{}", self.text);
+    fn with_text(self, texts: &[&str]) -> Self {
+        for text in texts {
+            assert!(self.text.contains(text), "no {text:?} in:\n{}", self.text);
         }
         self
     }
 
     #[track_caller]
-    fn not_saying(self, word: &str) -> Self {
-        assert!(!self.text.contains(word), "{word:?} in:\n{}", self.text);
+    fn without_text(self, text: &str) -> Self {
+        assert!(!self.text.contains(text), "{text:?} in:\n{}", self.text);
         self
     }
 }
@@ -284,7 +288,7 @@ impl Said {
 /// Not a test: the process that the tests start in their worlds.
 #[test]
 #[ignore = "started by the other tests"]
-fn in_a_world() {
+fn in_a_sandbox() {
     let Ok(what) = env::var(DO) else { return };
     system::catch_interrupts();
     let options = Options {
@@ -312,31 +316,35 @@ fn in_a_world() {
 }
 
 #[test]
-fn first_run_makes_all_and_second_run_nothing() {
-    let world = World::new();
-    world.does("doctor").badly(&["MISSING toolchain"]);
-    assert!(!world.cache("").exists(), "looking changes nothing");
-    world
-        .does("ready")
-        .well()
-        .saying(&["getting Rust 1.96.0", "building the boot loader"]);
-    world.is_whole();
-    world
-        .does("doctor")
-        .well()
-        .saying(&["Rust 1.96.0", "QEMU", "7.2.0 (fake)"])
-        .not_saying("MISSING");
-    let kernel = fs::metadata(world.path("target/kernel"))
+fn the_first_run_builds_everything_and_the_second_run_nothing() {
+    let sandbox = Sandbox::new();
+    sandbox.run("doctor").failed(&["MISSING toolchain"]);
+    assert!(!sandbox.cache("").exists(), "looking changes nothing");
+    sandbox.run("ready").succeeded().with_text(&[
+        "downloading Rust 1.96.0 with rustup",
+        "building the boot loader",
+    ]);
+    sandbox.assert_complete();
+    sandbox
+        .run("doctor")
+        .succeeded()
+        .with_text(&["Rust 1.96.0", "QEMU", "7.2.0 (fake)"])
+        .without_text("MISSING");
+    let kernel = fs::metadata(sandbox.path("target/kernel"))
         .unwrap()
         .modified()
         .unwrap();
-    assert_eq!(world.does("ready").well().text, "", "a warm run is silent");
     assert_eq!(
-        fs::read_to_string(world.path("home/rustup.log")).unwrap(),
+        sandbox.run("ready").succeeded().text,
+        "",
+        "a warm run is silent"
+    );
+    assert_eq!(
+        fs::read_to_string(sandbox.path("home/rustup.log")).unwrap(),
         "got\n"
     );
     assert_eq!(
-        fs::metadata(world.path("target/kernel"))
+        fs::metadata(sandbox.path("target/kernel"))
             .unwrap()
             .modified()
             .unwrap(),
@@ -345,38 +353,38 @@ fn first_run_makes_all_and_second_run_nothing() {
 }
 
 #[test]
-fn clean_removes_all_and_says_how_much() {
-    let world = World::new();
-    world.does("ready").well();
-    world
-        .does("clean")
-        .well()
-        .saying(&["toolchain-1.96.0", "freed"]);
-    assert_eq!(entries(&world.cache("")), 1, "only the lock stays");
-    assert!(!world.image().exists());
-    world.does("ready").well();
-    world.is_whole();
+fn clean_removes_everything_and_reports_the_bytes_freed() {
+    let sandbox = Sandbox::new();
+    sandbox.run("ready").succeeded();
+    sandbox
+        .run("clean")
+        .succeeded()
+        .with_text(&["toolchain-1.96.0", "freed"]);
+    assert_eq!(entries(&sandbox.cache("")), 1, "only the lock stays");
+    assert!(!sandbox.image().exists());
+    sandbox.run("ready").succeeded();
+    sandbox.assert_complete();
 }
 
 #[test]
-fn damaged_cache_is_made_again() {
-    let world = World::new();
-    world.does("ready").well();
-    let broken: [fn(&World); 3] = [
-        |world| {
+fn damaged_cache_entries_are_rebuilt() {
+    let sandbox = Sandbox::new();
+    sandbox.run("ready").succeeded();
+    let broken: [fn(&Sandbox); 3] = [
+        |sandbox| {
             fs::remove_file(
-                world.cache("toolchain-1.96.0/lib/rustlib/src/rust/library/core/src/lib.rs"),
+                sandbox.cache("toolchain-1.96.0/lib/rustlib/src/rust/library/core/src/lib.rs"),
             )
             .unwrap()
         },
-        |world| {
+        |sandbox| {
             write_program(
-                &world.cache("toolchain-1.96.0/bin/rustc"),
+                &sandbox.cache("toolchain-1.96.0/bin/rustc"),
                 "echo 'host: x86_64-unknown-linux-gnu'; echo 'release: 1.95.0'",
             )
         },
-        |world| {
-            for entry in fs::read_dir(world.cache(""))
+        |sandbox| {
+            for entry in fs::read_dir(sandbox.cache(""))
                 .unwrap()
                 .map(|entry| entry.unwrap().path())
             {
@@ -387,103 +395,106 @@ fn damaged_cache_is_made_again() {
         },
     ];
     for breaks in broken {
-        breaks(&world);
-        world.does("ready").well();
-        world.is_whole();
+        breaks(&sandbox);
+        sandbox.run("ready").succeeded();
+        sandbox.assert_complete();
     }
 }
 
 #[test]
-fn set_ups_wait_for_each_other() {
-    let world = World::new();
+fn two_set_ups_wait_for_each_other() {
+    let sandbox = Sandbox::new();
     // Slow enough that the second set-up reports that it waits.
-    world.program("cargo", &format!("sleep 1\n{CARGO}"));
+    sandbox.program("cargo", &format!("sleep 1\n{CARGO}"));
     let both: Vec<_> = (0..2)
-        .map(|_| world.command("ready").spawn().unwrap())
+        .map(|_| sandbox.command("ready").spawn().unwrap())
         .collect();
-    let said: Vec<_> = both
+    let outcome: Vec<_> = both
         .into_iter()
-        .map(|child| Said::from(child.wait_with_output().unwrap()))
+        .map(|child| Outcome::from(child.wait_with_output().unwrap()))
         .collect();
     assert_eq!(
-        said.iter()
-            .filter(|said| said.text.contains("waiting for another set-up"))
+        outcome
+            .iter()
+            .filter(|outcome| outcome.text.contains("waiting for another set-up"))
             .count(),
         1
     );
-    said.into_iter().for_each(|said| drop(said.well()));
+    outcome
+        .into_iter()
+        .for_each(|outcome| drop(outcome.succeeded()));
     assert_eq!(
-        fs::read_to_string(world.path("home/rustup.log")).unwrap(),
+        fs::read_to_string(sandbox.path("home/rustup.log")).unwrap(),
         "got\n"
     );
-    world.is_whole();
+    sandbox.assert_complete();
 }
 
 #[test]
-fn nothing_is_fetched_when_cargo_is_offline() {
-    let world = World::new();
-    let offline = world
+fn nothing_is_downloaded_when_cargo_is_offline() {
+    let sandbox = Sandbox::new();
+    let offline = sandbox
         .command("image")
         .env("CARGO_NET_OFFLINE", "true")
         .output()
         .unwrap();
-    Said::from(offline).badly(&["offline (CARGO_NET_OFFLINE)"]);
-    let settings = world.path("home/.cargo");
+    Outcome::from(offline).failed(&["offline (CARGO_NET_OFFLINE)"]);
+    let settings = sandbox.path("home/.cargo");
     fs::create_dir(&settings).unwrap();
     fs::write(settings.join("config.toml"), "[net]\noffline = true\n").unwrap();
-    world.does("image").badly(&["offline (net.offline in "]);
-    world
-        .does("doctor")
-        .badly(&["not used (net.offline in ", ".cargo/config.toml)"]);
-    assert!(!world.path("home/rustup.log").exists());
+    sandbox.run("image").failed(&["offline (net.offline in "]);
+    sandbox
+        .run("doctor")
+        .failed(&["not used (net.offline in ", ".cargo/config.toml)"]);
+    assert!(!sandbox.path("home/rustup.log").exists());
     fs::remove_dir_all(settings).unwrap();
-    world.does("image").well();
-    let offline = world
+    sandbox.run("image").succeeded();
+    let offline = sandbox
         .command("image")
         .env("CARGO_NET_OFFLINE", "true")
         .output()
         .unwrap();
-    Said::from(offline).well();
+    Outcome::from(offline).succeeded();
 }
 
 #[test]
-fn no_way_to_a_compiler_is_one_message() {
-    let world = World::new();
-    world.program(
+fn the_message_about_a_missing_compiler_names_every_failed_source_and_every_remedy() {
+    let sandbox = Sandbox::new();
+    sandbox.program(
         "rustup",
         "echo 'error: could not download: no network' >&2; exit 1",
     );
-    let words = [
+    let texts = [
         "- rustup: ",
         "could not download: no network",
-        "- Debian's packages: this is no Debian system",
+        "- Debian's packages: this is not a Debian system",
         "rustup toolchain install 1.96.0",
         "--toolchain DIR",
     ];
-    world.does("image").badly(&words);
-    world.remove("rustup");
-    world
-        .does("image")
-        .badly(&["install rustup (https://rustup.rs; it needs no administrator), then rustup"]);
-    assert_eq!(entries(&world.cache("aside")), 0);
+    sandbox.run("image").failed(&texts);
+    sandbox.remove("rustup");
+    sandbox
+        .run("image")
+        .failed(&["install rustup (https://rustup.rs; no administrator is needed), then rustup"]);
+    assert_eq!(entries(&sandbox.cache("temporary")), 0);
 }
 
 #[test]
-fn toolchains_of_the_users_choice_must_be_complete() {
-    let world = World::new();
-    let chosen = world.path("mine");
+fn a_chosen_toolchain_must_be_complete() {
+    let sandbox = Sandbox::new();
+    let chosen = sandbox.path("mine");
     let with = |variable: &str| {
-        Said::from(
-            world
+        Outcome::from(
+            sandbox
                 .command("image")
                 .env(variable, &chosen)
                 .output()
                 .unwrap(),
         )
     };
-    with("TEST_TOOLCHAIN").badly(&["mine is not a complete toolchain"]);
+    with("TEST_TOOLCHAIN").failed(&["mine: not a complete toolchain"]);
     fs::create_dir_all(chosen.join("bin")).unwrap();
-    with("CRYSTAL_BALL_TOOLCHAIN").badly(&["it has no bin/rustc"]);
+    with("CRYSTAL_BALL_TOOLCHAIN").failed(&["bin/rustc is missing"]);
     write_program(
         &chosen.join("bin/rustc"),
         "echo 'host: x86_64-unknown-linux-gnu'; echo 'release: 1.97.1'",
@@ -495,57 +506,60 @@ fn toolchains_of_the_users_choice_must_be_complete() {
         "bin/rust-lld",
     ];
     with("TEST_TOOLCHAIN")
-        .badly(&missing)
-        .not_saying("it has no bin/rustc");
-    write_program(&world.path("make"), &format!("{TOOLCHAIN}\ntoolchain $1"));
+        .failed(&missing)
+        .without_text("bin/rustc is missing");
+    write_program(&sandbox.path("make"), &format!("{TOOLCHAIN}\ntoolchain $1"));
     assert!(
-        Command::new(world.path("make"))
+        Command::new(sandbox.path("make"))
             .arg(&chosen)
             .status()
             .unwrap()
             .success()
     );
-    with("TEST_TOOLCHAIN").well();
-    assert!(!world.cache("toolchain-1.96.0").exists());
+    with("TEST_TOOLCHAIN").succeeded();
+    assert!(!sandbox.cache("toolchain-1.96.0").exists());
 }
 
 #[test]
-fn users_own_rustup_toolchain_is_used_in_place() {
-    let world = World::new();
+fn a_complete_rustup_toolchain_of_the_user_is_used_where_it_is() {
+    let sandbox = Sandbox::new();
     let which = r#"
 if [ $1 = which ]; then [ $RUSTUP_AUTO_INSTALL = 0 ] && echo $HOME/own/bin/rustc; exit; fi
 echo got >>$HOME/rustup.log; exit 1"#;
-    world.program(
+    sandbox.program(
         "rustup",
         &format!("{TOOLCHAIN}\n[ -d $HOME/own ] || toolchain $HOME/own{which}"),
     );
-    world.does("image").well();
-    assert!(!world.cache("toolchain-1.96.0").exists());
-    assert!(!world.path("home/rustup.log").exists());
+    sandbox.run("image").succeeded();
+    assert!(!sandbox.cache("toolchain-1.96.0").exists());
+    assert!(!sandbox.path("home/rustup.log").exists());
     // Without its sources the toolchain is incomplete, and the set-up tries the next source.
-    fs::remove_dir_all(world.path("home/own/lib/rustlib/src")).unwrap();
-    world.does("image").badly(&["- rustup: "]);
-    assert!(world.path("home/rustup.log").exists());
+    fs::remove_dir_all(sandbox.path("home/own/lib/rustlib/src")).unwrap();
+    sandbox.run("image").failed(&["- rustup: "]);
+    assert!(sandbox.path("home/rustup.log").exists());
 }
 
 #[test]
-fn cache_that_cannot_be_written_is_named() {
-    let world = World::new();
-    fs::write(world.path("file"), "").unwrap();
-    let run = world
+fn the_message_about_an_unusable_cache_names_its_folder() {
+    let sandbox = Sandbox::new();
+    fs::write(sandbox.path("file"), "").unwrap();
+    let run = sandbox
         .command("image")
-        .env("XDG_CACHE_HOME", world.path("file"))
+        .env("XDG_CACHE_HOME", sandbox.path("file"))
         .output()
         .unwrap();
-    Said::from(run).badly(&["file/crystal-ball cannot be used", "XDG_CACHE_HOME"]);
+    Outcome::from(run).failed(&[
+        "file/crystal-ball: the cache folder cannot be used",
+        "XDG_CACHE_HOME",
+    ]);
 }
 
 /// Debian without rustup: `answers` is apt-get's script for URIs and downloads.
-fn debian(answers: &str) -> World {
-    let world = World::new();
-    world.remove("rustup");
-    world.program("dpkg", "exit 1");
-    world.program("dpkg-query", "exit 0");
+fn debian(answers: &str) -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.remove("rustup");
+    sandbox.program("dpkg", "exit 1");
+    sandbox.program("dpkg-query", "exit 0");
     let script = format!(
         r#"
 echo "$*" >>$HOME/apt.log
@@ -560,45 +574,45 @@ case "$*" in
 *) {answers} ;;
 esac"#
     );
-    world.program("apt-get", &script);
-    world
+    sandbox.program("apt-get", &script);
+    sandbox
 }
 
 #[test]
-fn archive_with_another_version_is_named() {
-    let world = debian(r#"offers 1.97.0+dfsg1-1 00 "$@""#);
-    world.does("image").badly(&[
-        "rustc-web 1.97.0+dfsg1-1",
-        "pinned to 1.96.0",
+fn the_message_about_another_version_in_the_archive_names_both_versions() {
+    let sandbox = debian(r#"offers 1.97.0+dfsg1-1 00 "$@""#);
+    sandbox.run("image").failed(&[
+        "rustc-web: Debian's archive has version 1.97.0+dfsg1-1",
+        "Rust 1.96.0 is required",
         "--toolchain DIR",
     ]);
-    let asked = fs::read_to_string(world.path("home/apt.log")).unwrap();
+    let asked = fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
     assert!(
         asked.contains("Dir::State::lists"),
-        "newer lists are tried first, in a place of our own:\n{asked}"
+        "newer lists are tried first, in a private folder:\n{asked}"
     );
 }
 
 #[test]
-fn download_that_changed_on_its_way_is_refused() {
+fn a_damaged_download_is_refused() {
     let answers = r#"
     case "$*" in
     *print-uris*) offers 1.96.0+dfsg1-1 00 "$@" ;;
     *) for word; do echo hello >${word}_1.96.0+dfsg1-1_all.deb; done ;;
     esac"#;
-    let world = debian(answers);
-    world
-        .does("image")
-        .badly(&["was cut short or changed on its way", "SHA-256"]);
+    let sandbox = debian(answers);
+    sandbox
+        .run("image")
+        .failed(&["the download is damaged", "SHA-256"]);
     assert_eq!(
-        entries(&world.cache("packages-1.96.0")),
+        entries(&sandbox.cache("packages-1.96.0")),
         0,
-        "nothing of it is kept"
+        "no damaged package is kept"
     );
 }
 
 #[test]
-fn debian_packages_make_the_toolchain_and_are_kept() {
+fn debian_packages_make_the_toolchain_and_stay_in_the_cache() {
     let answers = r#"
     hash=5891b5b522d5df086d0ff0b110fbd9d21bb4fc7163af34d08286a2e846f6be03
     case "$*" in
@@ -606,7 +620,7 @@ fn debian_packages_make_the_toolchain_and_are_kept() {
     *) for word; do case $word in *rust*) echo hello >${word}_1.96.0+dfsg1-1_all.deb ;;
        *) echo hello >${word}_22_all.deb ;; esac; done ;;
     esac"#;
-    let world = debian(answers);
+    let sandbox = debian(answers);
     let unpack = r#"
 mkdir -p $3/usr/bin $3/usr/lib/x86_64-linux-gnu $3/usr/lib/llvm-22/bin $3/usr/lib/rustlib/src/rust/library/core/src
 touch $3/usr/lib/rustlib/src/rust/library/core/src/lib.rs
@@ -614,41 +628,41 @@ cd $3/usr/lib/llvm-22/bin
 for tool in llvm-objcopy llvm-objdump lld; do echo '#!/bin/sh' >$tool; chmod +x $tool; done
 printf '#!/bin/sh\n[ -d $LD_LIBRARY_PATH/../rustlib ] || exit 1
 echo "host: x86_64-unknown-linux-gnu"; echo "release: 1.96.0"' >$3/usr/bin/rustc; chmod +x $3/usr/bin/rustc"#;
-    world.program("dpkg", unpack);
-    world
-        .does("image")
-        .well()
-        .saying(&["downloading Rust 1.96.0 as 7 Debian packages"]);
-    let apt = || fs::read_to_string(world.path("home/apt.log")).unwrap();
+    sandbox.program("dpkg", unpack);
+    sandbox
+        .run("image")
+        .succeeded()
+        .with_text(&["downloading Rust 1.96.0 as 7 Debian packages"]);
+    let apt = || fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
     let asked = apt();
     assert!(!asked.contains("update"), "the system's lists do:\n{asked}");
 
     // Without the network and without the archive, which drops old versions: uses the kept packages.
-    fs::remove_dir_all(world.cache("toolchain-1.96.0")).unwrap();
+    fs::remove_dir_all(sandbox.cache("toolchain-1.96.0")).unwrap();
     let offline = || {
-        Said::from(
-            world
+        Outcome::from(
+            sandbox
                 .command("image")
                 .env("CARGO_NET_OFFLINE", "1")
                 .output()
                 .unwrap(),
         )
     };
-    offline().well().not_saying("downloading");
+    offline().succeeded().without_text("downloading");
     assert_eq!(apt(), asked);
 
     // Only a damaged package is fetched again.
     let damaged = "lld-22_22_all.deb";
-    fs::write(world.cache("packages-1.96.0").join(damaged), "hell").unwrap();
-    fs::remove_dir_all(world.cache("toolchain-1.96.0")).unwrap();
-    offline().badly(&["offline"]);
-    world.does("image").well();
+    fs::write(sandbox.cache("packages-1.96.0").join(damaged), "hell").unwrap();
+    fs::remove_dir_all(sandbox.cache("toolchain-1.96.0")).unwrap();
+    offline().failed(&["offline"]);
+    sandbox.run("image").succeeded();
     let last = apt().lines().last().unwrap().to_owned();
     assert!(last.ends_with(" download lld-22"), "{last}");
 }
 
 #[test]
-fn failing_download_keeps_what_is_whole() {
+fn a_failed_download_keeps_the_complete_packages() {
     // The hash of "hello\n"; the disk is full after the first package.
     let answers = r#"
     hash=5891b5b522d5df086d0ff0b110fbd9d21bb4fc7163af34d08286a2e846f6be03
@@ -657,18 +671,18 @@ fn failing_download_keeps_what_is_whole() {
     *) echo hello >rustc-web_1.96.0+dfsg1-1_all.deb
        echo "E: write (28: No space left on device)" >&2; exit 100 ;;
     esac"#;
-    let world = debian(answers);
-    world
-        .does("image")
-        .badly(&["No space left on device", "apt-get"]);
-    assert_eq!(entries(&world.cache("packages-1.96.0")), 1);
-    assert_eq!(entries(&world.cache("aside")), 0);
+    let sandbox = debian(answers);
+    sandbox
+        .run("image")
+        .failed(&["No space left on device", "apt-get"]);
+    assert_eq!(entries(&sandbox.cache("packages-1.96.0")), 1);
+    assert_eq!(entries(&sandbox.cache("temporary")), 0);
 }
 
 /// The real cargo reports the settings that it finds where the nested builds run, and where `cargo install`
 /// looks for them: in its home and above.
 #[test]
-fn users_cargo_settings_do_not_reach_the_builds() {
+fn the_users_cargo_settings_do_not_reach_the_builds() {
     const HOSTILE: &str = r#"
         [build]
         rustflags = ["-C", "target-cpu=native"]
@@ -688,7 +702,7 @@ fn users_cargo_settings_do_not_reach_the_builds() {
         [net]
         retry = 7
     "#;
-    let world = World::new();
+    let sandbox = Sandbox::new();
     let cargo = format!(
         r#"
 config() {{ {} -Zunstable-options config get; }}
@@ -697,11 +711,11 @@ case $* in */boot/image/*) (cd $CARGO_HOME/registry; config) >>$HOME/settings.lo
 {CARGO}"#,
         env!("CARGO")
     );
-    world.program("cargo", &cargo);
+    sandbox.program("cargo", &cargo);
     // Above the clone, which is the current folder; above the cache; and in cargo's home.
     for folder in [".cargo", "home/.cargo"] {
-        fs::create_dir(world.path(folder)).unwrap();
-        fs::write(world.path(folder).join("config.toml"), HOSTILE).unwrap();
+        fs::create_dir(sandbox.path(folder)).unwrap();
+        fs::write(sandbox.path(folder).join("config.toml"), HOSTILE).unwrap();
     }
     let hostile = [
         ("CARGO_BUILD_RUSTFLAGS", "-C target-cpu=native"),
@@ -715,10 +729,10 @@ case $* in */boot/image/*) (cd $CARGO_HOME/registry; config) >>$HOME/settings.lo
         ("RUSTC_WRAPPER", "/nowhere/wrapper"),
         ("CARGO_HTTP_TIMEOUT", "5"),
     ];
-    let mut run = world.command("image");
-    Said::from(run.envs(hostile).output().unwrap()).well();
-    world.is_whole();
-    let log = fs::read_to_string(world.path("home/settings.log")).unwrap();
+    let mut run = sandbox.command("image");
+    Outcome::from(run.envs(hostile).output().unwrap()).succeeded();
+    sandbox.assert_complete();
+    let log = fs::read_to_string(sandbox.path("home/settings.log")).unwrap();
     for word in [
         "native",
         "linux-gnu\"",
@@ -737,30 +751,34 @@ case $* in */boot/image/*) (cd $CARGO_HOME/registry; config) >>$HOME/settings.lo
 }
 
 #[test]
-fn missing_qemu_is_unpacked_into_the_cache() {
-    let world = World::new();
-    world.remove("qemu-system-x86_64");
-    world.does("qemu").badly(&[
-        "QEMU is needed",
-        "this is no Debian system",
+fn a_missing_qemu_is_unpacked_into_the_cache() {
+    let sandbox = Sandbox::new();
+    sandbox.remove("qemu-system-x86_64");
+    sandbox.run("qemu").failed(&[
+        "QEMU: not installed",
+        "this is not a Debian system",
         "ask your administrator",
         "sudo apt-get install qemu-system-x86",
         "--qemu PATH",
     ]);
-    world
-        .does("doctor")
-        .badly(&["MISSING QEMU", "package manager"]);
-    world.debian_with_qemu();
-    world
-        .does("doctor")
-        .badly(&["the next run unpacks Debian's package qemu-system-x86"]);
-    world.does("qemu").well().saying(&[
+    sandbox
+        .run("doctor")
+        .failed(&["MISSING QEMU", "package manager"]);
+    sandbox.debian_with_qemu();
+    sandbox
+        .run("doctor")
+        .failed(&["the next run unpacks Debian's package qemu-system-x86"]);
+    sandbox.run("qemu").succeeded().with_text(&[
         "downloading QEMU as 2 Debian packages (12 B), once",
         "unpacking QEMU",
         "QEMU is in ",
     ]);
-    assert_eq!(world.does("qemu").well().text, "", "a kept one is used");
-    let asked = || fs::read_to_string(world.path("home/apt.log")).unwrap();
+    assert_eq!(
+        sandbox.run("qemu").succeeded().text,
+        "",
+        "the QEMU in the cache is used"
+    );
+    let asked = || fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
     let downloaded = |line: &&str| line.contains(" download ") && line.contains("libsame");
     assert_eq!(asked().lines().find(downloaded), None, "the system has it");
     // The installation is planned and downloaded, but not carried out.
@@ -768,107 +786,125 @@ fn missing_qemu_is_unpacked_into_the_cache() {
     assert_eq!(asked().lines().find(installs), None);
 
     // QEMU no longer starts, since a library of the system is gone; it is unpacked again.
-    write_program(&world.cache("qemu/usr/bin/qemu-system-x86_64"), "exit 127");
-    world
-        .does("qemu")
-        .well()
-        .saying(&["the kept QEMU is not used", "unpacking QEMU"]);
-    // Without the network, a kept QEMU is good enough.
+    write_program(
+        &sandbox.cache("qemu/usr/bin/qemu-system-x86_64"),
+        "exit 127",
+    );
+    sandbox.run("qemu").succeeded().with_text(&[
+        "the cached QEMU does not work and is not used",
+        "unpacking QEMU",
+    ]);
+    // Without the network, the cached QEMU is used even if it has no window.
     let offline = |what| {
-        let mut command = world.command(what);
-        Said::from(command.env("CARGO_NET_OFFLINE", "1").output().unwrap())
+        let mut command = sandbox.command(what);
+        Outcome::from(command.env("CARGO_NET_OFFLINE", "1").output().unwrap())
     };
-    offline("qemu").well();
+    offline("qemu").succeeded();
     offline("window")
-        .well()
-        .saying(&["cannot open a window", "offline"]);
+        .succeeded()
+        .with_text(&["cannot open a window", "offline"]);
     // A QEMU with a window replaces the other.
-    world
-        .does("window")
-        .well()
-        .saying(&["downloading QEMU and its window"]);
-    assert_eq!(world.does("window").well().text, "");
-    assert_eq!(entries(&world.cache("")), 3, "lock, aside, QEMU");
-    assert_eq!(entries(&world.cache("aside")), 0);
+    sandbox
+        .run("window")
+        .succeeded()
+        .with_text(&["downloading QEMU and its window"]);
+    assert_eq!(sandbox.run("window").succeeded().text, "");
+    assert_eq!(
+        entries(&sandbox.cache("")),
+        3,
+        "lock, temporary folders, QEMU"
+    );
+    assert_eq!(entries(&sandbox.cache("temporary")), 0);
 }
 
 #[test]
-fn qemu_of_a_suite_is_beside_the_systems() {
-    let world = World::new();
-    world.debian_with_qemu();
+fn the_qemu_of_a_debian_suite_does_not_replace_the_systems_qemu() {
+    let sandbox = Sandbox::new();
+    sandbox.debian_with_qemu();
     let of = |suite: &str| {
-        let mut command = world.command("suite");
-        Said::from(command.env("TEST_SUITE", suite).output().unwrap())
+        let mut command = sandbox.command("suite");
+        Outcome::from(command.env("TEST_SUITE", suite).output().unwrap())
     };
-    of("sid").well().saying(&["unpacking QEMU", "qemu-sid"]);
-    assert_eq!(of("sid").well().text, "");
-    let asked = fs::read_to_string(world.path("home/apt.log")).unwrap();
+    of("sid")
+        .succeeded()
+        .with_text(&["unpacking QEMU", "qemu-sid"]);
+    assert_eq!(of("sid").succeeded().text, "");
+    let asked = fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
     assert!(asked.contains("-t sid"), "{asked}");
     for other in ["", "../x", "-o", "a b"] {
-        of(other).badly(&["is not the name of a Debian suite"]);
+        of(other).failed(&["not the name of a Debian suite"]);
     }
 }
 
 #[test]
-fn full_disk_ends_the_search_for_a_compiler() {
-    let world = debian("exit 1");
-    world.program(
+fn a_full_disk_ends_the_search_for_a_compiler() {
+    let sandbox = debian("exit 1");
+    sandbox.program(
         "rustup",
         "echo 'error: could not write: No space left on device (os error 28)' >&2; exit 1",
     );
-    world
-        .does("image")
-        .badly(&["No space left on device"])
-        .not_saying("Debian");
-    assert!(!world.path("home/apt.log").exists());
+    sandbox
+        .run("image")
+        .failed(&["No space left on device"])
+        .without_text("Debian");
+    assert!(!sandbox.path("home/apt.log").exists());
 }
 
 #[test]
-fn being_without_a_window_is_no_error() {
-    let world = World::new();
-    world.program("qemu-system-x86_64", &QEMU.replace("gtk", "curses"));
-    world
-        .does("window")
-        .well()
-        .saying(&["cannot open a window", "install qemu-system-gui"]);
-    world.does("ready").well().not_saying("window");
+fn a_missing_window_is_not_an_error() {
+    let sandbox = Sandbox::new();
+    sandbox.program("qemu-system-x86_64", &QEMU.replace("gtk", "curses"));
+    sandbox
+        .run("window")
+        .succeeded()
+        .with_text(&["cannot open a window", "install qemu-system-gui"]);
+    sandbox.run("ready").succeeded().without_text("window");
 }
 
 #[test]
-fn interrupted_set_up_leaves_nothing_aside() {
-    let world = World::new();
-    world.program("cargo", "echo working >&2; sleep 60");
-    let child = world.command("image").spawn().unwrap();
+fn an_interrupted_set_up_leaves_no_temporary_folder() {
+    let sandbox = Sandbox::new();
+    sandbox.program("cargo", "echo working >&2; sleep 60");
+    let child = sandbox.command("image").spawn().unwrap();
     wait_for(|| {
-        world.cache("aside").exists()
-            && entries(&world.cache("aside")) > 0
-            && world.cache("toolchain-1.96.0").exists()
+        sandbox.cache("temporary").exists()
+            && entries(&sandbox.cache("temporary")) > 0
+            && sandbox.cache("toolchain-1.96.0").exists()
     });
     signal(&child, "TERM");
-    let said = Said::from(child.wait_with_output().unwrap());
-    assert_eq!(said.code, Some(Interrupted::EXIT_CODE), "{}", said.text);
-    assert_eq!(entries(&world.cache("aside")), 0);
+    let outcome = Outcome::from(child.wait_with_output().unwrap());
+    assert_eq!(
+        outcome.code,
+        Some(Interrupted::EXIT_CODE),
+        "{}",
+        outcome.text
+    );
+    assert_eq!(entries(&sandbox.cache("temporary")), 0);
 }
 
 #[test]
-fn children_and_their_children_die_with_the_set_up() {
+fn children_and_grandchildren_end_with_the_set_up() {
     for signal_name in ["KILL", "TERM"] {
-        let world = World::new();
-        let beat = world.path("beat");
+        let sandbox = Sandbox::new();
+        let beat = sandbox.path("beat");
         let beats = || fs::metadata(&beat).map_or(0, |data| data.len());
         let script = format!(
             "sh -c 'while :; do echo >>{}; sleep 0.02; done' & wait",
             beat.display()
         );
-        world.program("cargo", &script);
-        let mut child = world.command("image").spawn().unwrap();
+        sandbox.program("cargo", &script);
+        let mut child = sandbox.command("image").spawn().unwrap();
         wait_for(|| beats() > 3);
         signal(&child, signal_name);
         child.wait().unwrap();
         sleep(Duration::from_millis(200));
         let then = beats();
         sleep(Duration::from_millis(200));
-        assert_eq!(beats(), then, "a grandchild lives on after {signal_name}");
+        assert_eq!(
+            beats(),
+            then,
+            "a grandchild is still running after {signal_name}"
+        );
     }
 }
 
@@ -876,10 +912,10 @@ fn children_and_their_children_die_with_the_set_up() {
 /// run has finished, so each of these moments is in another step: download, unpacking, boot loader, kernel.
 #[test]
 #[ignore = "downloads the compiler and builds the boot loader, several times"]
-fn real_set_up_recovers_from_kills() {
-    let world = World::empty(true);
+fn a_real_set_up_continues_after_a_kill() {
+    let sandbox = Sandbox::empty(true);
     for seconds in [1, 2, 4, 8, 12, 16, 30, 60, 100, 150] {
-        let mut child = world
+        let mut child = sandbox
             .command("image")
             .stderr(Stdio::inherit())
             .spawn()
@@ -889,21 +925,21 @@ fn real_set_up_recovers_from_kills() {
         let killed = child.wait().unwrap().signal();
         writeln!(std::io::stderr(), "*** after {seconds} s: {killed:?}").unwrap();
     }
-    world.does("image").well();
-    assert!(fs::metadata(world.image()).unwrap().len() > 1_000_000);
-    assert_eq!(entries(&world.cache("aside")), 0);
+    sandbox.run("image").succeeded();
+    assert!(fs::metadata(sandbox.image()).unwrap().len() > 1_000_000);
+    assert_eq!(entries(&sandbox.cache("temporary")), 0);
 }
 
-/// Kills a set-up at ten moments, each time in a new world; each time the next run must succeed.
+/// Kills a set-up at ten moments, each time in a new sandbox; each time the next run must succeed.
 #[test]
-fn set_up_recovers_from_kills() {
-    let reference = World::new();
+fn a_set_up_continues_after_a_kill() {
+    let reference = Sandbox::new();
     let begun = Instant::now();
-    reference.does("image").well();
+    reference.run("image").succeeded();
     let length = begun.elapsed();
     for moment in 1..=10 {
-        let world = World::new();
-        let mut child = world
+        let sandbox = Sandbox::new();
+        let mut child = sandbox
             .command("image")
             .stderr(Stdio::null())
             .spawn()
@@ -911,8 +947,8 @@ fn set_up_recovers_from_kills() {
         sleep(length * moment / 11);
         child.kill().unwrap();
         child.wait().unwrap();
-        world.does("image").well();
-        world.is_whole();
+        sandbox.run("image").succeeded();
+        sandbox.assert_complete();
     }
 }
 

@@ -20,7 +20,7 @@ const AT_ONCE: usize = 8;
 
 /// A configuration's expected result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Expected {
+enum ExpectedResult {
     /// All goldens are equal.
     Equal,
     /// The run ends with this exit code.
@@ -82,32 +82,32 @@ fn memories() -> Vec<Configuration> {
     all
 }
 
-fn expected(version: &str, (vga, arguments): &Configuration) -> Expected {
+fn expected(version: &str, (vga, arguments): &Configuration) -> ExpectedResult {
     match (*vga, arguments.as_str()) {
         // QEMU 10.0 shows RAM in place of the window at A0000h.
-        ("std", "-machine q35,smm=off") if version.starts_with("10.0.") => Expected::End(17),
-        ("none", "" | "-device bochs-display") => Expected::End(14),
-        (_, "-m 16" | "-cpu qemu32") => Expected::End(14),
+        ("std", "-machine q35,smm=off") if version.starts_with("10.0.") => ExpectedResult::End(17),
+        ("none", "" | "-device bochs-display") => ExpectedResult::End(14),
+        (_, "-m 16" | "-cpu qemu32") => ExpectedResult::End(14),
         // It has no PCI, and so no virtio disk.
-        (_, "-machine isapc") => Expected::End(15),
-        _ => Expected::Equal,
+        (_, "-machine isapc") => ExpectedResult::End(15),
+        _ => ExpectedResult::Equal,
     }
 }
 
 #[test]
-fn expectations_know_the_versions() {
+fn the_expected_results_depend_on_qemus_version() {
     let smm_off = ("std", "-machine q35,smm=off".to_string());
     for (version, expects) in [
-        ("7.2.22 (Debian 1:7.2)", Expected::Equal),
-        ("10.0.2 (Debian 1:10.0.2)", Expected::End(17)),
-        ("11.1.3 (Debian 1:11.1.3)", Expected::Equal),
+        ("7.2.22 (Debian 1:7.2)", ExpectedResult::Equal),
+        ("10.0.2 (Debian 1:10.0.2)", ExpectedResult::End(17)),
+        ("11.1.3 (Debian 1:11.1.3)", ExpectedResult::Equal),
     ] {
         assert_eq!(expected(version, &smm_off), expects, "{version}");
     }
 }
 
 /// A row of the table: the QEMU's version, and how many results were as expected.
-struct Row {
+struct QemuResults {
     version: String,
     equal: usize,
     ended: usize,
@@ -116,9 +116,9 @@ struct Row {
 }
 
 /// Runs the whole set on one QEMU.
-fn on(ready: &Ready) -> Row {
+fn results_on(ready: &Ready) -> QemuResults {
     let version = ready.qemu.version.clone();
-    let mut row = Row {
+    let mut row = QemuResults {
         version,
         equal: 0,
         ended: 0,
@@ -132,10 +132,10 @@ fn on(ready: &Ready) -> Row {
         let what = format!("-vga {} {}", configuration.0, configuration.1);
         let config = with_arguments(ready, configuration.0, &configuration.1);
         let (outcome, why) = match agrees(goldens, &config) {
-            Ok(()) => (Some(Expected::Equal), String::new()),
+            Ok(()) => (Some(ExpectedResult::Equal), String::new()),
             Err(error) => {
                 let failure = error.downcast_ref::<Failure>();
-                let end = failure.map(|failure| Expected::End(failure.verdict.exit_code()));
+                let end = failure.map(|failure| ExpectedResult::End(failure.verdict.exit_code()));
                 (end, format!("{error:#}"))
             }
         };
@@ -148,8 +148,8 @@ fn on(ready: &Ready) -> Row {
         }
         eprintln!("{}: {what}: {expects:?}", row.version);
         match expects {
-            Expected::Equal => row.equal += 1,
-            Expected::End(_) => row.ended += 1,
+            ExpectedResult::Equal => row.equal += 1,
+            ExpectedResult::End(_) => row.ended += 1,
         }
     }
     if let Err(error) = boots(ready, &mut row.boots) {
@@ -183,7 +183,7 @@ fn boots(ready: &Ready, done: &mut usize) -> anyhow::Result<()> {
 }
 
 #[test]
-#[ignore = "takes minutes for each QEMU; run it by `cargo wide`"]
+#[ignore = "runs for minutes with each QEMU; run it by `cargo wide`"]
 fn wide_set() {
     let listed = std::env::var_os("CRYSTAL_BALL_QEMUS").unwrap_or_default();
     let listed = std::env::split_paths(&listed).filter(|path| !path.as_os_str().is_empty());
@@ -191,10 +191,10 @@ fn wide_set() {
     if qemus.is_empty() {
         qemus.push(None);
     }
-    let rows: Vec<Row> = qemus
+    let rows: Vec<QemuResults> = qemus
         .into_iter()
         .map(|qemu| {
-            on(&ready::with(&Options {
+            results_on(&ready::with(&Options {
                 qemu,
                 ..Options::default()
             }))
@@ -203,7 +203,7 @@ fn wide_set() {
     println!("| QEMU | equal | ended as expected | equal boots | wrong |");
     println!("| --- | --- | --- | --- | --- |");
     for row in &rows {
-        let Row {
+        let QemuResults {
             version,
             equal,
             ended,

@@ -4,7 +4,7 @@ use std::ffi::OsString;
 
 use frames::options::FrameOptions;
 use import::{Files, Model};
-use qemu::{Config, Machine};
+use qemu::{Config, Vm};
 use setup::{Options, Ready};
 use system::{quote, say};
 
@@ -67,10 +67,10 @@ impl Common {
     /// Does the set-up and boots the image without a window.
     ///
     /// # Errors
-    /// As [`setup::ready`] and [`Machine::boot`].
-    pub fn boot(&mut self, model: Option<&Model>) -> anyhow::Result<Machine> {
+    /// As [`setup::ready`] and [`Vm::boot`].
+    pub fn boot(&mut self, model: Option<&Model>) -> anyhow::Result<Vm> {
         let ready = setup::ready(&self.options)?;
-        Machine::boot(&self.config(&ready, model))
+        Vm::boot(&self.config(&ready, model))
     }
 }
 

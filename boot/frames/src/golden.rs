@@ -46,7 +46,7 @@ use crate::indexed::IndexedImage;
 use crate::options::FrameOptions;
 use crate::report::Report;
 use crate::rgb::RgbImage;
-use system::Step;
+use system::Progress;
 use system::quote::{self, printable, quoted};
 use system::write_atomically;
 
@@ -476,7 +476,7 @@ pub fn bless<C: Backend>(
     }
     let mut machine = boot()?;
     let mut disagree = Findings::default();
-    let mut step = Step::counting("comparing with QEMU's VGA", changes.len() as u64);
+    let mut step = Progress::counting("asking QEMU", changes.len() as u64);
     for (done, (golden, _)) in (1..).zip(&changes) {
         disagree.check_cards(golden, &mut emulated, &mut machine, Transfer::Bytes)?;
         step.at(done);

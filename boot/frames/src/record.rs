@@ -20,7 +20,7 @@ use crate::backend::{Backend, EmulatedDemo};
 use crate::indexed::IndexedImage;
 use crate::options::FrameOptions;
 use crate::write::range;
-use system::Step;
+use system::Progress;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
@@ -89,7 +89,7 @@ impl RecordOptions {
     ) -> anyhow::Result<()> {
         let numbers = self.frames.clone().step_by(self.every as usize);
         let what = format_args!("recording into {}", self.out.display());
-        let mut step = Step::counting(what, numbers.clone().count() as u64);
+        let mut step = Progress::counting(what, numbers.clone().count() as u64);
         machine.show_with(options, &[])?;
         emulated.show_with(options, &[])?;
         let mut frames = (1..).zip(numbers).map(|(done, number)| {

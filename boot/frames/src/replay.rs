@@ -16,7 +16,7 @@ use crate::comparison::list;
 use crate::difference::Capture;
 use crate::indexed::IndexedImage;
 use crate::rgb::RgbImage;
-use system::Step;
+use system::Progress;
 use system::{Interrupted, interrupted, write_atomically};
 use vga::widen;
 
@@ -65,7 +65,7 @@ impl ReplayOptions {
         }
         let files = self.files()?;
         let mut frames = Vec::new();
-        let mut step = Step::counting("reading", files.len() as u64);
+        let mut step = Progress::counting("reading", files.len() as u64);
         for (done, file) in (1..).zip(&files) {
             if interrupted() {
                 return Err(Interrupted.into());

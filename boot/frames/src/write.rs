@@ -12,7 +12,7 @@ use protocol::{Command, Content, FrameName, Motion};
 
 use crate::backend::Backend;
 use crate::options::FrameOptions;
-use system::Step;
+use system::Progress;
 use system::{Interrupted, interrupted, write_atomically};
 
 /// The options of `dump` and `emulate`: the frames, how much of video memory, and the folder.
@@ -137,7 +137,7 @@ impl DumpOptions {
         let motion = self.motion();
         let (count, frames) = self.frames();
         let what = format_args!("dumping into {}", self.out.display());
-        let mut step = Step::counting(what, count);
+        let mut step = Progress::counting(what, count);
         for (done, frame) in (1..).zip(frames) {
             if interrupted() {
                 return Err(Interrupted.into());

@@ -40,13 +40,13 @@ const GLINT: f64 = 0.4;
 
 /// The part of the error that the next variant corrects. With a part of 1, a small error would add up until
 /// one texel of the four has a different hue, which is more visible than the error.
-const MADE_GOOD: f32 = 0.6;
+const CORRECTED_PART: f32 = 0.6;
 /// The additional weight of the most frequent material, compared with a material that hardly occurs.
-const MOST_WEIGHT: f64 = 32.0;
+const MAX_WEIGHT: f64 = 32.0;
 
-/// A reduced texture.
+/// A texture with a limited number of colours, its palette and its light table.
 #[derive(Clone, Debug)]
-pub struct Reduced {
+pub struct QuantizedTexture {
     /// The material and the variant of each texel, row by row.
     pub texels: Vec<u8>,
     /// The DAC's colours.
@@ -55,15 +55,15 @@ pub struct Reduced {
     pub light: LightTable,
 }
 
-/// Reduces a texture with this number of columns.
-pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
+/// Quantises a texture with this number of columns.
+pub fn quantize(texture: &[Rgb<u8>], columns: usize) -> QuantizedTexture {
     let colours: Vec<_> = texture
         .iter()
         .map(|&Rgb(parts)| Srgb::from(parts))
         .collect();
     let materials = quantized(&colours, MATERIALS);
     let of_materials = srgb8_to_oklab(&materials);
-    let nearest_material = Nearest::new(of_materials);
+    let nearest_material = NearestColour::new(of_materials);
     let colours = srgb8_to_oklab(&colours);
     let mut used = vec![0; materials.len()];
     let texels: Vec<_> = colours
@@ -91,14 +91,14 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
         .iter()
         .map(|colour| Srgb::from(colour.map(widen)))
         .collect();
-    let nearest_entry = Nearest::new(srgb8_to_oklab(&shown));
+    let nearest_entry = NearestColour::new(srgb8_to_oklab(&shown));
     let mut light = [[0; 256]; LIGHT_LEVELS];
     for (row, lit) in light.iter_mut().zip(lit) {
         for (entries, target) in row.chunks_exact_mut(VARIANTS).zip(srgb8_to_oklab(&lit)) {
-            let mut wanted = target;
+            let mut corrected = target;
             let mut chosen = [0; VARIANTS].map(|_: u8| {
-                let entry = nearest_entry.to(wanted);
-                wanted += (target - nearest_entry.colours[entry]) * MADE_GOOD;
+                let entry = nearest_entry.to(corrected);
+                corrected += (target - nearest_entry.colours[entry]) * CORRECTED_PART;
                 entry
             });
             let lightness = |&entry: &usize| nearest_entry.colours[entry].l;
@@ -108,7 +108,7 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
             }
         }
     }
-    Reduced {
+    QuantizedTexture {
         texels,
         palette,
         light,
@@ -119,7 +119,7 @@ pub fn reduce(texture: &[Rgb<u8>], columns: usize) -> Reduced {
 /// and a small detail, such as an eye in it, keeps its colour.
 fn weighted(lit: &[Vec<Srgb<u8>>], used: &[u32]) -> Vec<Srgb<u8>> {
     let most = used.iter().copied().max().unwrap_or(1);
-    let times = |used: u32| 1 + (MOST_WEIGHT * (f64::from(used) / f64::from(most)).sqrt()) as usize;
+    let times = |used: u32| 1 + (MAX_WEIGHT * (f64::from(used) / f64::from(most)).sqrt()) as usize;
     let mut weighted = Vec::new();
     for level in lit {
         for (&colour, &used) in level.iter().zip(used) {
@@ -143,7 +143,7 @@ fn quantized(colours: &[Srgb<u8>], count: usize) -> Vec<Srgb<u8>> {
         .quantize_method(QuantizeMethod::kmeans());
     let input = pipeline
         .input_slice(colours)
-        .expect("there are some, and not too many");
+        .expect("a texture has 1 to 65 536 colours");
     input.output_srgb8_palette().into_vec()
 }
 
@@ -167,11 +167,11 @@ fn narrow(colour: Srgb<u8>) -> Rgb6 {
 }
 
 /// Finds the nearest of some colours.
-struct Nearest {
+struct NearestColour {
     colours: Vec<Oklab>,
 }
 
-impl Nearest {
+impl NearestColour {
     fn new(colours: Vec<Oklab>) -> Self {
         Self { colours }
     }
@@ -205,24 +205,24 @@ mod tests {
     }
 
     #[test]
-    fn four_texels_together_have_their_colour_in_full_light() {
+    fn four_neighbouring_texels_average_to_the_intended_colour() {
         let texture = texture();
-        let reduced = reduce(&texture, 64);
+        let result = quantize(&texture, 64);
         let shown = |x: usize, y: usize| {
-            let entry = reduced.light[FULL_LIGHT][usize::from(reduced.texels[64 * y + x])];
-            reduced.palette[usize::from(entry)].map(|part| i32::from(widen(part)))
+            let entry = result.light[FULL_LIGHT][usize::from(result.texels[64 * y + x])];
+            result.palette[usize::from(entry)].map(|part| i32::from(widen(part)))
         };
         let (mut worst, mut sum) = (0, 0);
         for y in (0..64).step_by(2) {
             for x in (0..64).step_by(2) {
                 let four = [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)];
                 for k in 0..3 {
-                    let meant: i32 = four
+                    let intended: i32 = four
                         .map(|(x, y)| i32::from(texture[64 * y + x].0[k]))
                         .iter()
                         .sum();
-                    let is: i32 = four.map(|(x, y)| shown(x, y)[k]).iter().sum();
-                    let off = (meant - is).abs() / 4;
+                    let drawn: i32 = four.map(|(x, y)| shown(x, y)[k]).iter().sum();
+                    let off = (intended - drawn).abs() / 4;
                     (worst, sum) = (worst.max(off), sum + off);
                 }
             }
@@ -236,21 +236,21 @@ mod tests {
     }
 
     #[test]
-    fn light_brightens_and_what_is_not_the_models_stays() {
-        let reduced = reduce(&texture(), 64);
+    fn light_levels_brighten_and_reserved_palette_entries_stay() {
+        let result = quantize(&texture(), 64);
         let built_in = Colours::BUILT_IN.palette;
         for entry in (0..256).filter(|entry| !scene::MATERIALS.contains(entry)) {
-            assert_eq!(reduced.palette[entry], built_in[entry]);
+            assert_eq!(result.palette[entry], built_in[entry]);
         }
         for step in HEAT {
-            assert!(reduced.palette.contains(&step), "{step:?}");
+            assert!(result.palette.contains(&step), "{step:?}");
         }
         let brightness = |level: usize| -> u32 {
-            let entries = reduced
+            let entries = result
                 .texels
                 .iter()
-                .map(|&texel| reduced.light[level][usize::from(texel)]);
-            let parts = entries.map(|entry| reduced.palette[usize::from(entry)].map(u32::from));
+                .map(|&texel| result.light[level][usize::from(texel)]);
+            let parts = entries.map(|entry| result.palette[usize::from(entry)].map(u32::from));
             parts.map(|[r, g, b]| 3 * r + 6 * g + b).sum()
         };
         for level in 1..LIGHT_LEVELS {
@@ -259,12 +259,12 @@ mod tests {
     }
 
     #[test]
-    fn one_colour_is_a_texture_too_and_the_same_comes_out_again() {
+    fn a_single_colour_is_a_valid_texture_and_the_result_is_deterministic() {
         let plain = [Rgb([10, 200, 30])];
-        let reduced = reduce(&plain, 1);
-        let entry = reduced.light[FULL_LIGHT][usize::from(reduced.texels[0])];
-        assert_eq!(reduced.palette[usize::from(entry)], [2, 49, 7]);
-        let (once, again) = (reduce(&texture(), 64), reduce(&texture(), 64));
+        let result = quantize(&plain, 1);
+        let entry = result.light[FULL_LIGHT][usize::from(result.texels[0])];
+        assert_eq!(result.palette[usize::from(entry)], [2, 49, 7]);
+        let (once, again) = (quantize(&texture(), 64), quantize(&texture(), 64));
         assert_eq!((once.texels, once.palette), (again.texels, again.palette));
         assert_eq!(once.light, again.light);
     }

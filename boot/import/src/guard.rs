@@ -1,4 +1,4 @@
-//! Protection against files that take for ever to read, or make a library panic.
+//! Protection against files whose import does not end, or makes a library panic.
 //!
 //! The work is done on a separate thread, and nobody has to wait for it, whatever it is doing: reading an
 //! endless pipe, cutting a face, decoding, quantising. The calling thread waits for the result, and watches
@@ -12,7 +12,7 @@ use anyhow::{Context, bail};
 use system::{Interrupted, interrupted};
 
 /// The interval at which the waiting thread checks for interrupts and for the time limit.
-const LOOK_UP: Duration = Duration::from_millis(20);
+const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// The size of the worker's stack: that of a program's first thread.
 const STACK: usize = 8 << 20;
 
@@ -32,15 +32,15 @@ pub fn run<T: Send + 'static>(
         // If the caller has given up, nobody needs the result.
         let _ = send.send(work());
     });
-    worker.context("there is no thread to read files on")?;
+    worker.context("no thread can be started to import the model")?;
     let begun = Instant::now();
     loop {
-        match done.recv_timeout(LOOK_UP) {
+        match done.recv_timeout(POLL_INTERVAL) {
             Ok(result) => return result,
             Err(RecvTimeoutError::Timeout) if interrupted() => return Err(Interrupted.into()),
             Err(RecvTimeoutError::Timeout) if begun.elapsed() < limit => {}
             Err(RecvTimeoutError::Timeout) => bail!(
-                "{name}: making a model of it takes more than {} s; simplify it",
+                "{name}: the import has not finished within {} s; simplify the model",
                 limit.as_secs()
             ),
             Err(RecvTimeoutError::Disconnected) => break,
@@ -48,7 +48,7 @@ pub fn run<T: Send + 'static>(
     }
     // The worker ended without a result.
     bail!(
-        "{name}: reading it or its texture made this program panic, as said above; please report \
-         it, with the files"
+        "{name}: this program panicked while it imported the model or its texture (see the panic above); \
+         please report it, with the files"
     )
 }

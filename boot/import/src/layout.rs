@@ -23,7 +23,7 @@ const TEXEL: f64 = 65_536.0;
 
 /// The interval that is cut from the plane of repeated images, along one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Window {
+struct CropRange {
     /// The texels of the whole image, after scaling.
     image: u32,
     /// The first texel of the cut, relative to the start of the first image.
@@ -32,7 +32,7 @@ struct Window {
     texels: u16,
 }
 
-impl Window {
+impl CropRange {
     /// Returns the interval for coordinates from `low` to `high`, in whole images of `pixels` pixels.
     fn around(low: f64, high: f64, pixels: u32) -> Self {
         let mut image = pixels.min((256.0 / (high - low).max(1e-9)) as u32).max(1);
@@ -86,8 +86,8 @@ fn range(polygon: &Polygon, axis: usize) -> (f64, f64) {
 /// The cut of a model's texture from its image.
 #[derive(Clone, Copy, Debug)]
 pub struct Layout {
-    across: Window,
-    down: Window,
+    across: CropRange,
+    down: CropRange,
 }
 
 impl Layout {
@@ -102,8 +102,8 @@ impl Layout {
                 let (from, to) = range(polygon, axis);
                 if to - from > MAX_REPEATS {
                     let why = format!(
-                        "the face repeats the texture {:.0} times, and at most {MAX_REPEATS} fit \
-                         into 256 texels; cut the face or scale its texture coordinates",
+                        "the face repeats the texture {:.0} times, but at most {MAX_REPEATS} \
+                         repeats fit into 256 texels; cut the face or scale its texture coordinates",
                         to - from
                     );
                     return Err(BadLine {
@@ -117,8 +117,8 @@ impl Layout {
         }
         let [(left, right), (top, bottom)] = ranges;
         Ok(Self {
-            across: Window::around(left, right, width),
-            down: Window::around(top, bottom, height),
+            across: CropRange::around(left, right, width),
+            down: CropRange::around(top, bottom, height),
         })
     }
 
@@ -195,7 +195,7 @@ mod tests {
     const WHOLE: [[f64; 2]; 3] = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0]];
 
     #[test]
-    fn a_small_image_stays_as_it_is_and_a_large_one_is_scaled_to_fit() {
+    fn a_small_image_keeps_its_size_and_a_large_image_is_scaled_down() {
         for (image, size) in [
             ((256, 256), (256, 256)),
             ((1, 7), (1, 7)),
@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_used_is_cut_and_in_full_sharpness() {
+    fn only_the_used_part_of_the_image_is_cut_at_full_resolution() {
         let corner = [[0.5, 0.25], [0.75, 0.25], [0.5, 0.0]];
         let (layout, places) = laid_out(&[corner], (512, 512));
         assert_eq!((layout.size(), layout.scaled()), ((128, 128), (512, 512)));
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn what_repeats_is_repeated_and_each_face_is_moved_to_the_first() {
+    fn a_repeated_image_is_cut_repeated_and_each_face_begins_in_the_first_image() {
         let wide = [[-3.0, 8.0], [-1.0, 8.0], [-3.0, 7.0]];
         let (layout, places) = laid_out(&[wide, WHOLE], (256, 256));
         assert_eq!((layout.size(), layout.scaled()), ((256, 256), (128, 256)));
@@ -232,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hair_beyond_the_border_is_the_border() {
+    fn a_coordinate_just_beyond_the_border_is_clamped_to_it() {
         let hair = [[-0.0005, 1.0004], [1.0006, 1.0], [0.0, -0.001]];
         let (layout, places) = laid_out(&[hair], (256, 256));
         assert_eq!(layout.size(), (256, 256));
@@ -241,22 +241,22 @@ mod tests {
     }
 
     #[test]
-    fn every_window_fits_whatever_the_coordinates() {
+    fn every_crop_range_fits_for_any_coordinates() {
         let mut random = seeded::generator();
         for case in 0..20_000 {
             let low = random.f64();
             let high = low + random.f64().powi(8) * MAX_REPEATS;
             let pixels = random.u32(1..=MAX_PIXELS);
-            let window = Window::around(low, high, pixels);
+            let range = CropRange::around(low, high, pixels);
             assert!(
-                window.image <= pixels && (1..=256).contains(&window.texels),
+                range.image <= pixels && (1..=256).contains(&range.texels),
                 "{case}"
             );
-            for (place, border) in [(low, 0.0), (high, f64::from(window.texels))] {
-                let texel = place * f64::from(window.image) - window.first as f64;
-                assert!((texel - border).abs() <= 1.0, "{case}: {window:?}");
+            for (place, border) in [(low, 0.0), (high, f64::from(range.texels))] {
+                let texel = place * f64::from(range.image) - range.first as f64;
+                assert!((texel - border).abs() <= 1.0, "{case}: {range:?}");
             }
-            assert!(window.pixel(u32::from(window.texels) - 1) < window.image);
+            assert!(range.pixel(u32::from(range.texels) - 1) < range.image);
         }
     }
 }

@@ -1,6 +1,6 @@
 //! From an OBJ's polygons to a mesh of flat convex faces.
 //!
-//! # Whole, or cut
+//! # Uncut and cut polygons
 //!
 //! A face of the renderer is convex and flat, and has one texture plane. A polygon that meets all three
 //! conditions stays whole, up to [`MAX_CORNERS`] corners. Any other polygon is cut into triangles by ear
@@ -16,7 +16,7 @@ use scene::{Corner, MAX_CORNERS, MAX_FACES, MeshFace, Pose, Vec3};
 
 use crate::layout::Layout;
 use crate::obj::{BadLine, SIMPLIFY};
-use crate::polygon::{GRID, Place, Polygons, Tally};
+use crate::polygon::{FaceCounts, GRID, PolygonCorner, Polygons};
 use crate::vector::{cross, dot, minus};
 
 /// The largest difference in height of a face's corners over its plane, in units: a fifteenth of a pixel at
@@ -28,29 +28,29 @@ const TEXEL_FIT: f64 = 1.0 / 16.0;
 const LEAST_ANCHORED: f64 = 1.0 / 16.0;
 /// A mesh that owns its data.
 #[derive(Clone, Debug, Default)]
-pub struct Solid {
+pub struct ImportedMesh {
     /// The vertices, as in [`scene::Mesh`].
     pub vertices: Vec<Vec3>,
     /// The corners, as in [`scene::Mesh`].
     pub corners: Vec<Corner>,
     /// The faces, as in [`scene::Mesh`], but with `first` left at zero.
     pub faces: Vec<MeshFace>,
-    /// What happened to the file's faces.
-    pub tally: Tally,
+    /// Counts of the file's faces that were not imported unchanged.
+    pub counts: FaceCounts,
 }
 
-/// Whether a solid's faces face a viewer.
+/// The side to which a mesh's faces look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Turned {
+pub enum Facing {
     /// Some faces face the viewer.
-    Seen,
-    /// All faces face the solid's centre: the solid is inside out.
-    Inside,
+    Viewer,
+    /// All faces face the mesh's centre: the mesh is inside out.
+    Inward,
     /// No face faces the viewer in the first frame.
     Away,
 }
 
-impl Solid {
+impl ImportedMesh {
     /// Makes a mesh from polygons, with corners placed in the texture that `layout` cuts.
     ///
     /// # Errors
@@ -60,14 +60,14 @@ impl Solid {
         let Polygons {
             vertices,
             polygons,
-            tally,
+            counts,
         } = polygons;
-        let mut solid = Self {
+        let mut mesh = Self {
             vertices,
-            tally,
+            counts,
             ..Self::default()
         };
-        let mut ears = Ears::default();
+        let mut ears = EarCutter::default();
         // The number of faces, if each cut yields all its triangles.
         let mut triangles = 0;
         for polygon in &polygons {
@@ -84,34 +84,34 @@ impl Solid {
             let corners: Vec<_> = corners.collect();
             let normal = polygon.normal.map(|k| (k * 16_384.0).round() as i32);
             let mut add = |piece: &mut dyn Iterator<Item = usize>| {
-                let before = solid.corners.len();
-                solid.corners.extend(piece.map(|i| corners[i]));
-                solid.faces.push(MeshFace {
+                let before = mesh.corners.len();
+                mesh.corners.extend(piece.map(|i| corners[i]));
+                mesh.faces.push(MeshFace {
                     first: 0,
-                    corners: (solid.corners.len() - before) as u16,
+                    corners: (mesh.corners.len() - before) as u16,
                     texture: 0,
                     normal,
                 });
             };
             let n = corners.len();
-            let whole = first_of_whole(&polygon.ring, polygon.normal, &corners);
-            triangles += whole.map_or(n - 2, |_| 1);
+            let uncut = first_corner_of_uncut(&polygon.ring, polygon.normal, &corners);
+            triangles += uncut.map_or(n - 2, |_| 1);
             // Checked before the cut, because to cut a face that visits the same points again and again
             // needs seconds.
             if triangles > MAX_FACES {
                 let why = format!(
                     "with this face cut into triangles the model has more than {MAX_FACES} faces \
                      (the file has {}); {SIMPLIFY}",
-                    polygons.len() + tally.degenerate,
+                    polygons.len() + counts.degenerate,
                 );
                 let line = polygon.line;
                 return Err(BadLine { line, why }.into());
             }
-            match whole {
+            match uncut {
                 Some(first) => add(&mut (0..n).map(|i| (first + i) % n)),
                 None => {
                     let triangles = ears.cut(&polygon.ring);
-                    solid.tally.cut += 1;
+                    mesh.counts.cut += 1;
                     triangles
                         .iter()
                         .for_each(|triangle| add(&mut triangle.iter().copied()));
@@ -119,19 +119,19 @@ impl Solid {
             }
         }
         ensure!(
-            solid.corners.len() <= MAX_ALL_CORNERS,
-            "its faces have {} corners, and a model has at most {MAX_ALL_CORNERS}; {SIMPLIFY}",
-            solid.corners.len()
+            mesh.corners.len() <= MAX_ALL_CORNERS,
+            "the faces have {} corners, but at most {MAX_ALL_CORNERS} are allowed; {SIMPLIFY}",
+            mesh.corners.len()
         );
         ensure!(
-            !solid.faces.is_empty(),
-            "none of its faces can be cut into triangles; {SIMPLIFY}"
+            !mesh.faces.is_empty(),
+            "no face can be cut into triangles; {SIMPLIFY}"
         );
-        Ok(solid)
+        Ok(mesh)
     }
 
     /// Returns which way the faces look, to find a file with the opposite winding rule.
-    pub fn turned(&self) -> Turned {
+    pub fn facing(&self) -> Facing {
         let pose = Pose::at_tick(0);
         let turn = pose.orientation();
         let (mut inside, mut away) = (true, true);
@@ -152,15 +152,19 @@ impl Solid {
             away &= dot(from_eye, turn.turn(face.normal).map(f64::from)) >= 0.0;
         }
         match (inside, away) {
-            (true, _) => Turned::Inside,
-            (_, true) => Turned::Away,
-            _ => Turned::Seen,
+            (true, _) => Facing::Inward,
+            (_, true) => Facing::Away,
+            _ => Facing::Viewer,
         }
     }
 }
 
 /// Returns the first corner of a polygon that stays whole, or `None` if the polygon must be cut.
-fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Option<usize> {
+fn first_corner_of_uncut(
+    ring: &[PolygonCorner],
+    normal: [f64; 3],
+    corners: &[Corner],
+) -> Option<usize> {
     let n = ring.len();
     if n == 3 {
         return Some(0);
@@ -170,16 +174,17 @@ fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Optio
     }
     // A corner's signed distance from an edge, as an area on the plane. In a convex polygon, no corner is
     // outside any edge.
-    let area =
-        |a: &Place, b: &Place, c: &Place| dot(cross(minus(b.at, a.at), minus(c.at, a.at)), normal);
+    let area = |a: &PolygonCorner, b: &PolygonCorner, c: &PolygonCorner| {
+        dot(cross(minus(b.at, a.at), minus(c.at, a.at)), normal)
+    };
     let convex = (0..n).all(|i| {
         let (a, b) = (&ring[i], &ring[(i + 1) % n]);
         ring.iter().all(|c| area(a, b, c) <= 0.0)
     });
-    let whole: f64 = -(1..n - 1)
+    let area_of_face: f64 = -(1..n - 1)
         .map(|i| area(&ring[0], &ring[i], &ring[i + 1]))
         .sum::<f64>();
-    let height = |place: &Place| dot(minus(place.at, ring[0].at), normal);
+    let height = |place: &PolygonCorner| dot(minus(place.at, ring[0].at), normal);
     let (low, high) = ring.iter().map(height).fold((0.0, 0.0), |(low, high), h| {
         (f64::min(low, h), f64::max(high, h))
     });
@@ -194,7 +199,7 @@ fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Optio
         -area(a, b, c)
     };
     let first = (0..n).max_by(|&a, &b| anchored(a).total_cmp(&anchored(b)))?;
-    if anchored(first) < LEAST_ANCHORED * whole {
+    if anchored(first) < LEAST_ANCHORED * area_of_face {
         return None;
     }
     let three = anchors(first);
@@ -216,21 +221,21 @@ fn first_of_whole(ring: &[Place], normal: [f64; 3], corners: &[Corner]) -> Optio
 
 /// Cuts polygons into triangles.
 #[derive(Default)]
-struct Ears {
+struct EarCutter {
     earcut: Earcut<f64>,
     flat: Vec<[f64; 2]>,
     cut: Vec<usize>,
 }
 
-impl Ears {
+impl EarCutter {
     /// Returns the triangles of a polygon, each with its corners in the polygon's order.
-    fn cut(&mut self, ring: &[Place]) -> Vec<[usize; 3]> {
+    fn cut(&mut self, ring: &[PolygonCorner]) -> Vec<[usize; 3]> {
         let points: Vec<_> = ring.iter().map(|place| place.at).collect();
         self.cut.clear();
         if project3d_to_2d(&points, points.len(), &mut self.flat) {
-            let none: &[usize] = &[];
+            let no_holes: &[usize] = &[];
             self.earcut
-                .earcut(self.flat.iter().copied(), none, &mut self.cut);
+                .earcut(self.flat.iter().copied(), no_holes, &mut self.cut);
         }
         let (triangles, _) = self.cut.as_chunks::<3>();
         let in_order = |triangle: &[usize; 3]| {
@@ -247,22 +252,22 @@ mod tests {
     use super::*;
     use crate::polygon::RADIUS;
     use crate::vector::length;
-    use crate::{obj, solid};
+    use crate::{make_mesh, obj};
 
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n\
                           vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5 1\n";
 
-    fn made(text: &str) -> Solid {
+    fn made(text: &str) -> ImportedMesh {
         let obj = obj::parse(text.as_bytes()).unwrap();
-        let (solid, layout) = solid(&obj, (256, 256)).unwrap();
+        let (mesh, layout) = make_mesh(&obj, (256, 256)).unwrap();
         assert_eq!(layout.size(), (256, 256));
-        solid
+        mesh
     }
 
     /// Returns each face's corners.
-    fn faces(solid: &Solid) -> Vec<Vec<Corner>> {
-        let mut rest = &solid.corners[..];
-        let faces = solid.faces.iter().map(|face| {
+    fn faces(mesh: &ImportedMesh) -> Vec<Vec<Corner>> {
+        let mut rest = &mesh.corners[..];
+        let faces = mesh.faces.iter().map(|face| {
             let (corners, after) = rest.split_at(face.corners.into());
             rest = after;
             corners.to_vec()
@@ -273,8 +278,8 @@ mod tests {
     }
 
     /// Returns twice a face's area along its normal, in square units; negative if the face is inside out.
-    fn area(solid: &Solid, face: &MeshFace, corners: &[Corner]) -> f64 {
-        let at = |i: usize| solid.vertices[usize::from(corners[i].vertex)].map(f64::from);
+    fn area(mesh: &ImportedMesh, face: &MeshFace, corners: &[Corner]) -> f64 {
+        let at = |i: usize| mesh.vertices[usize::from(corners[i].vertex)].map(f64::from);
         let sides =
             (1..corners.len() - 1).map(|i| cross(minus(at(i + 1), at(0)), minus(at(i), at(0))));
         let normal = face.normal.map(|k| f64::from(k) / 16_384.0);
@@ -283,10 +288,10 @@ mod tests {
 
     #[test]
     fn a_flat_convex_face_of_one_texture_plane_stays_whole() {
-        let solid = made(&format!("{SQUARE}f 1/1 2/2 3/3 4/4\n"));
-        assert_eq!(solid.tally, Tally::default());
-        let [face] = &faces(&solid)[..] else {
-            panic!("{solid:?}");
+        let mesh = made(&format!("{SQUARE}f 1/1 2/2 3/3 4/4\n"));
+        assert_eq!(mesh.counts, FaceCounts::default());
+        let [face] = &faces(&mesh)[..] else {
+            panic!("{mesh:?}");
         };
         // Seen from the front, y points up in the file, so the corners are clockwise from some corner.
         let side = 256 << 16;
@@ -300,7 +305,7 @@ mod tests {
         let found: Vec<_> = face
             .iter()
             .map(|corner| {
-                let [x, y, z] = solid.vertices[usize::from(corner.vertex)];
+                let [x, y, z] = mesh.vertices[usize::from(corner.vertex)];
                 assert_eq!(z, 0);
                 [x, y, corner.u, corner.v]
             })
@@ -314,11 +319,11 @@ mod tests {
             "{found:?}"
         );
         // The face looks at a viewer in front of the screen.
-        assert_eq!(solid.faces[0].normal, [0, 0, -16_384]);
+        assert_eq!(mesh.faces[0].normal, [0, 0, -16_384]);
     }
 
     #[test]
-    fn any_other_face_is_cut_and_nothing_of_it_is_lost() {
+    fn any_other_face_is_cut_into_triangles_with_the_same_area() {
         let bent = SQUARE.replace("v 1 1 0", "v 1 1 .2");
         let rim = |n: usize| {
             let radius = |i| if n == 24 && i % 2 == 1 { 0.4 } else { 1.0 };
@@ -359,12 +364,12 @@ mod tests {
             ),
         ] {
             let obj = obj::parse(text.as_bytes()).unwrap();
-            let (solid, _) = solid(&obj, (256, 256)).unwrap();
-            assert_eq!(solid.faces.len(), pieces, "{text}");
-            assert_eq!(solid.tally.cut, usize::from(pieces > 1));
-            let areas = solid.faces.iter().zip(faces(&solid));
+            let (mesh, _) = make_mesh(&obj, (256, 256)).unwrap();
+            assert_eq!(mesh.faces.len(), pieces, "{text}");
+            assert_eq!(mesh.counts.cut, usize::from(pieces > 1));
+            let areas = mesh.faces.iter().zip(faces(&mesh));
             let areas: Vec<_> = areas
-                .map(|(face, corners)| area(&solid, face, &corners))
+                .map(|(face, corners)| area(&mesh, face, &corners))
                 .collect();
             assert!(areas.iter().all(|&area| area > 0.0), "{text}: {areas:?}");
             let sum: f64 = areas.iter().sum();
@@ -374,51 +379,50 @@ mod tests {
             );
             // The light shows no cuts.
             assert!(
-                solid
-                    .faces
+                mesh.faces
                     .iter()
-                    .all(|face| face.normal == solid.faces[0].normal)
+                    .all(|face| face.normal == mesh.faces[0].normal)
             );
         }
     }
 
     #[test]
-    fn the_texture_plane_is_not_made_of_corners_on_a_line() {
+    fn the_three_corners_of_the_texture_plane_are_not_collinear() {
         // The middle of the lower side is a corner as well, so that some choices of three corners make a
         // narrow triangle.
         let text = format!("{SQUARE}v .5 0 0\nvt .5 0\nf 1/1 5/6 2/2 3/3 4/4\n");
-        let solid = made(&text);
-        let [face] = &faces(&solid)[..] else {
-            panic!("{solid:?}");
+        let mesh = made(&text);
+        let [face] = &faces(&mesh)[..] else {
+            panic!("{mesh:?}");
         };
         let three = [0, 5 / 3, 10 / 3].map(|i: usize| face[i]);
-        assert!(area(&solid, &solid.faces[0], &three) > 0.5);
+        assert!(area(&mesh, &mesh.faces[0], &three) > 0.5);
     }
 
     #[test]
-    fn faces_without_an_area_are_dropped_and_points_in_one_place_are_one() {
+    fn faces_without_an_area_are_dropped_and_equal_points_are_merged() {
         let text = format!(
             "{SQUARE}v 1 1 0.0000001\no two\nf 1/1 2/2 5/3 4/4\n\
              f 1 1 2\nf 1 2\nf 3 5 1\nf\nf 1 2 3 2\nf 1 1 2 2 3 5\n"
         );
-        let solid = made(&text);
-        assert_eq!(solid.vertices.len(), 4);
-        assert_eq!(solid.tally.degenerate, 5);
-        assert_eq!(solid.faces.len(), 2);
-        assert_eq!(faces(&solid)[1].len(), 3);
+        let mesh = made(&text);
+        assert_eq!(mesh.vertices.len(), 4);
+        assert_eq!(mesh.counts.degenerate, 5);
+        assert_eq!(mesh.faces.len(), 2);
+        assert_eq!(faces(&mesh)[1].len(), 3);
     }
 
     #[test]
-    fn made_up_coordinates_put_the_texture_on_each_side_of_a_box_the_right_way_round() {
+    fn generated_coordinates_put_the_texture_on_each_side_of_a_box_without_mirroring() {
         let text = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
                     f 5 6 7 8\nf 2 1 4 3\nf 6 2 3 7\nf 1 5 8 4\nf 8 7 3 4\nf 1 2 6 5\n";
         let obj = obj::parse(text.as_bytes()).unwrap();
-        let (solid, layout) = solid(&obj, (256, 256)).unwrap();
-        assert_eq!((solid.tally.projected, solid.faces.len()), (6, 6));
+        let (mesh, layout) = make_mesh(&obj, (256, 256)).unwrap();
+        assert_eq!((mesh.counts.projected, mesh.faces.len()), (6, 6));
         // The cube's edge is 1.15 times the radius of its ball, so it covers 1.15 of the projection's 2.
         assert_eq!(layout.size(), (148, 148));
-        for (face, corners) in solid.faces.iter().zip(faces(&solid)) {
-            assert!(area(&solid, face, &corners) > 0.0);
+        for (face, corners) in mesh.faces.iter().zip(faces(&mesh)) {
+            assert!(area(&mesh, face, &corners) > 0.0);
             // Corners that are clockwise on the screen are clockwise in the texture, so nothing is mirrored.
             let [a, b, c] = [0, 1, 2].map(|i: usize| [corners[i].u, corners[i].v].map(f64::from));
             let turn = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
@@ -427,7 +431,7 @@ mod tests {
     }
 
     #[test]
-    fn a_model_fits_its_ball_wherever_it_was_and_however_large() {
+    fn a_model_of_any_size_and_position_is_scaled_to_fit_its_ball() {
         for (scale, shift) in [
             (1.0, 0.0),
             (1e-6, 1.0),
@@ -438,9 +442,9 @@ mod tests {
             let square = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
             let vertex = |(x, y)| format!("v {:e} {:e} 3\n", x * scale + shift, y * scale + shift);
             let text = square.map(vertex).concat() + "f 1 2 3 4\n";
-            let solid = made_small(&text);
+            let mesh = made_small(&text);
             let far = |vertex: &Vec3| length(vertex.map(f64::from)) / GRID;
-            for vertex in &solid.vertices {
+            for vertex in &mesh.vertices {
                 assert!(
                     (far(vertex) - RADIUS).abs() < 1e-4,
                     "{scale} {shift}: {vertex:?}"
@@ -449,8 +453,8 @@ mod tests {
         }
     }
 
-    fn made_small(text: &str) -> Solid {
-        solid(&obj::parse(text.as_bytes()).unwrap(), (256, 256))
+    fn made_small(text: &str) -> ImportedMesh {
+        make_mesh(&obj::parse(text.as_bytes()).unwrap(), (256, 256))
             .unwrap()
             .0
     }

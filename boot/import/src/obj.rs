@@ -44,8 +44,8 @@ const SKIPPED: [&[u8]; 6] = [b"g", b"mtllib", b"o", b"s", b"usemtl", b"vn"];
 const KEYWORDS: [&[u8]; 13] = [
     b"f", b"fo", b"g", b"l", b"mtllib", b"o", b"p", b"s", b"usemtl", b"v", b"vn", b"vp", b"vt",
 ];
-/// The maximum number of kinds of left-out statements that the message names.
-const KINDS: usize = 6;
+/// The maximum number of kinds of skipped statements that the message names.
+const MAX_KINDS: usize = 6;
 
 /// The polygons of an OBJ file.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -54,28 +54,28 @@ pub struct Obj {
     pub positions: Vec<[f64; 3]>,
     /// Texture coordinates: u to the right, v up, the whole texture from 0 to 1; finite. Texture coordinates
     /// that no face uses are zeros.
-    pub places: Vec<[f64; 2]>,
+    pub texture_coordinates: Vec<[f64; 2]>,
     /// The corners of all faces.
-    pub corners: Vec<Corner>,
+    pub corners: Vec<ObjCorner>,
     /// The faces.
-    pub faces: Vec<Face>,
+    pub faces: Vec<ObjFace>,
     /// The statements that are unknown, or make no polygon.
-    pub left_out: LeftOut,
+    pub skipped: SkippedStatements,
 }
 
 /// A corner of a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Corner {
+pub struct ObjCorner {
     /// The index of the position.
     pub position: u32,
     /// The index of the texture coordinates. Either all corners of a face have texture coordinates, or no
     /// corner has.
-    pub place: Option<u32>,
+    pub uv: Option<u32>,
 }
 
 /// A polygon, counter-clockwise when seen from its front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Face {
+pub struct ObjFace {
     /// The index of the first corner.
     pub first: usize,
     /// The number of corners, at most [`MAX_CORNERS`].
@@ -84,32 +84,32 @@ pub struct Face {
     pub line: usize,
 }
 
-/// The statements that were left out.
+/// The statements that were skipped.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct LeftOut {
+pub struct SkippedStatements {
     /// The number of statements.
     pub count: usize,
     /// The first keywords in the order of the file, each with its first line and its number of statements.
     pub kinds: Vec<(Vec<u8>, usize, usize)>,
 }
 
-impl LeftOut {
+impl SkippedStatements {
     fn add(&mut self, keyword: &[u8], line: usize) {
         self.count += 1;
         let known = self.kinds.iter_mut().find(|(known, ..)| known == keyword);
         if let Some((.., count)) = known {
             *count += 1;
-        } else if self.kinds.len() < KINDS {
+        } else if self.kinds.len() < MAX_KINDS {
             self.kinds.push((keyword.to_vec(), line, 1));
         }
     }
 }
 
-/// Writes how many statements were left out, and of which kinds.
-impl fmt::Display for LeftOut {
+/// Writes the number of skipped statements, and their kinds.
+impl fmt::Display for SkippedStatements {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let s = if self.count == 1 { "" } else { "s" };
-        write!(f, "{} statement{s} left out", self.count)?;
+        write!(f, "{} statement{s} skipped", self.count)?;
         if self.count == 0 {
             return Ok(());
         }
@@ -128,7 +128,7 @@ impl fmt::Display for LeftOut {
 
 impl Obj {
     /// Returns the corners of a face.
-    pub fn corners_of(&self, face: &Face) -> &[Corner] {
+    pub fn corners_of(&self, face: &ObjFace) -> &[ObjCorner] {
         &self.corners[face.first..][..face.corners]
     }
 }
@@ -166,13 +166,13 @@ pub fn parse(bytes: &[u8]) -> Result<Obj, BadLine> {
         return Ok(obj);
     }
     used.positions.fill(true);
-    used.places.fill(true);
+    used.texture_coordinates.fill(true);
     let wrong = coordinates(bytes, &mut obj, &used).err();
-    let unknown = obj.left_out.kinds.first();
+    let unknown = obj.skipped.kinds.first();
     let unknown = unknown.map(|(keyword, line, _)| BadLine {
         line: *line,
         why: format!(
-            "{} is not a statement of a Wavefront OBJ, and the file has no faces; give an OBJ file",
+            "{} is not a statement of a Wavefront OBJ, and the file has no faces; pass an OBJ file",
             quoted(keyword)
         ),
     });
@@ -188,14 +188,14 @@ pub fn parse(bytes: &[u8]) -> Result<Obj, BadLine> {
 
 /// A value for the positions, and a value for the texture coordinates.
 #[derive(Clone, Copy, Debug, Default)]
-struct Each<T> {
+struct ByAttribute<T> {
     positions: T,
-    places: T,
+    texture_coordinates: T,
 }
 
 /// Reads the faces, and counts the positions and texture coordinates.
-fn faces(bytes: &[u8], obj: &mut Obj) -> Result<Each<usize>, BadLine> {
-    let mut there = Each::default();
+fn faces(bytes: &[u8], obj: &mut Obj) -> Result<ByAttribute<usize>, BadLine> {
+    let mut counts = ByAttribute::default();
     for statement in Statements::new(bytes) {
         let line = statement.line;
         let wrong = |why| BadLine { line, why };
@@ -204,56 +204,56 @@ fn faces(bytes: &[u8], obj: &mut Obj) -> Result<Each<usize>, BadLine> {
             continue;
         };
         match keyword {
-            b"v" => there.positions += 1,
-            b"vt" => there.places += 1,
+            b"v" => counts.positions += 1,
+            b"vt" => counts.texture_coordinates += 1,
             b"f" | b"fo" => {
                 if statement.cut {
-                    let why = "the face goes on in a next line, and the file ends here; it is cut \
-                               short: save it again";
+                    let why = "the face continues on the next line, but the file ends here; save the \
+                               file again";
                     return Err(wrong(why.into()));
                 }
-                face(line, words, there, obj).map_err(wrong)?;
+                face(line, words, counts, obj).map_err(wrong)?;
             }
             skipped if SKIPPED.contains(&skipped) => {}
-            unknown => obj.left_out.add(unknown, line),
+            unknown => obj.skipped.add(unknown, line),
         }
     }
-    Ok(there)
+    Ok(counts)
 }
 
 /// Reads a face from its corners.
 fn face<'a>(
     line: usize,
     mut words: impl Iterator<Item = &'a [u8]>,
-    there: Each<usize>,
+    counts: ByAttribute<usize>,
     obj: &mut Obj,
 ) -> Result<(), String> {
     let first = obj.corners.len();
     for word in words.by_ref().take(MAX_CORNERS) {
-        obj.corners.push(corner(word, there)?);
+        obj.corners.push(corner(word, counts)?);
     }
     let corners = obj.corners.len() - first;
     let more = words.count();
     if more > 0 {
         return Err(format!(
-            "the face has {} corners, and a face has at most {MAX_CORNERS}; {SIMPLIFY}",
+            "the face has {} corners, but at most {MAX_CORNERS} are allowed; {SIMPLIFY}",
             corners + more
         ));
     }
     if obj.faces.len() == MAX_READ || obj.corners.len() > MAX_READ_CORNERS {
         return Err(format!(
-            "here the file has {} faces and {} corners, more than the {MAX_READ} and \
-             {MAX_READ_CORNERS} that are read; {SIMPLIFY}",
+            "up to this line the file has {} faces and {} corners, but at most {MAX_READ} \
+             faces and {MAX_READ_CORNERS} corners are allowed; {SIMPLIFY}",
             obj.faces.len() + 1,
             obj.corners.len(),
         ));
     }
-    let own = &mut obj.corners[first..];
-    if own.iter().any(|corner| corner.place.is_none()) {
+    let face_corners = &mut obj.corners[first..];
+    if face_corners.iter().any(|corner| corner.uv.is_none()) {
         // The face gets projected coordinates, and uses no coordinates of the file.
-        own.iter_mut().for_each(|corner| corner.place = None);
+        face_corners.iter_mut().for_each(|corner| corner.uv = None);
     }
-    obj.faces.push(Face {
+    obj.faces.push(ObjFace {
         first,
         corners,
         line,
@@ -262,47 +262,48 @@ fn face<'a>(
 }
 
 /// What the user can do about a model that is too large.
-pub const SIMPLIFY: &str = "simplify it in the program that made it";
+pub const SIMPLIFY: &str = "simplify the model in the program that made it";
 
 /// Reads a corner: `1`, `1/2`, `1//3` or `1/2/3`. The normal's index can be any text.
-fn corner(word: &[u8], there: Each<usize>) -> Result<Corner, String> {
+fn corner(word: &[u8], counts: ByAttribute<usize>) -> Result<ObjCorner, String> {
     let mut parts = word.split(|&byte| byte == b'/');
-    let mut index = |what, there| match parts.next() {
+    let mut index = |what, counts| match parts.next() {
         None | Some(b"") => Ok(None),
-        Some(part) => match from_zero(part, there) {
+        Some(part) => match from_zero(part, counts) {
             Ok(index) => Ok(Some(index)),
             Err(why) => Err(format!("{}: the {what} {why}", quoted(word))),
         },
     };
-    let position = index("position", there.positions)?;
-    let place = index("texture coordinate", there.places)?;
+    let position = index("position", counts.positions)?;
+    let uv = index("texture coordinate", counts.texture_coordinates)?;
     if parts.nth(1).is_some() {
         return Err(format!(
             "{} has more than three indices; write a corner as 1/2/3",
             quoted(word)
         ));
     }
-    let position =
-        position.ok_or_else(|| format!("{} has no position; write it first", quoted(word)))?;
-    Ok(Corner { position, place })
+    let position = position
+        .ok_or_else(|| format!("{} has no position; write a corner as 1/2/3", quoted(word)))?;
+    Ok(ObjCorner { position, uv })
 }
 
 /// Converts an index of the file, counted from 1, to an index counted from 0. A positive index may precede
 /// what it names. A negative index counts back from the last element before the line.
-fn from_zero(word: &[u8], there: usize) -> Result<u32, String> {
+fn from_zero(word: &[u8], counts: usize) -> Result<u32, String> {
     let number = std::str::from_utf8(word).ok();
     let number = number.and_then(|word| word.parse::<i128>().ok());
-    let number = number.ok_or_else(|| format!("{} is not a whole number", quoted(word)))?;
+    let number = number
+        .ok_or_else(|| format!("{} is not a whole number; correct the index", quoted(word)))?;
     match number {
-        0 => Err("0 does not exist; count from 1".into()),
+        0 => Err("0 does not exist; indices count from 1".into()),
         1.. => u32::try_from(number - 1)
             .map_err(|_| format!("{number} does not exist; correct the index")),
         _ => usize::try_from(-number)
             .ok()
-            .and_then(|back| there.checked_sub(back))
+            .and_then(|back| counts.checked_sub(back))
             .map(|index| index as u32)
             .ok_or_else(|| {
-                format!("{number} does not exist: {there} come before this line; correct the index")
+                format!("{number} does not exist: the file has {counts} before this line; correct the index")
             }),
     }
 }
@@ -311,10 +312,10 @@ fn from_zero(word: &[u8], there: usize) -> Result<u32, String> {
 ///
 /// # Errors
 /// The first face that uses an element that does not exist.
-fn used(obj: &Obj, there: Each<usize>) -> Result<Each<Vec<bool>>, BadLine> {
-    let mut used = Each {
-        positions: vec![false; there.positions],
-        places: vec![false; there.places],
+fn used(obj: &Obj, counts: ByAttribute<usize>) -> Result<ByAttribute<Vec<bool>>, BadLine> {
+    let mut used = ByAttribute {
+        positions: vec![false; counts.positions],
+        texture_coordinates: vec![false; counts.texture_coordinates],
     };
     let mark = |used: &mut Vec<bool>, index: u32, what: &str| match used.get_mut(index as usize) {
         Some(used) => {
@@ -330,8 +331,8 @@ fn used(obj: &Obj, there: Each<usize>) -> Result<Each<Vec<bool>>, BadLine> {
     for face in &obj.faces {
         for corner in obj.corners_of(face) {
             mark(&mut used.positions, corner.position, "position")
-                .and_then(|()| match corner.place {
-                    Some(place) => mark(&mut used.places, place, "texture coordinate"),
+                .and_then(|()| match corner.uv {
+                    Some(uv) => mark(&mut used.texture_coordinates, uv, "texture coordinate"),
                     None => Ok(()),
                 })
                 .map_err(|why| BadLine {
@@ -344,12 +345,15 @@ fn used(obj: &Obj, there: Each<usize>) -> Result<Each<Vec<bool>>, BadLine> {
 }
 
 /// Reads the coordinates that are used.
-fn coordinates(bytes: &[u8], obj: &mut Obj, used: &Each<Vec<bool>>) -> Result<(), BadLine> {
+fn coordinates(bytes: &[u8], obj: &mut Obj, used: &ByAttribute<Vec<bool>>) -> Result<(), BadLine> {
     // Zeroed memory that is never written needs no physical memory.
     obj.positions = vec![[0.0; 3]; used.positions.len()];
-    obj.places = vec![[0.0; 2]; used.places.len()];
+    obj.texture_coordinates = vec![[0.0; 2]; used.texture_coordinates.len()];
     let mut positions = obj.positions.iter_mut().zip(&used.positions);
-    let mut places = obj.places.iter_mut().zip(&used.places);
+    let mut texture_coordinates = obj
+        .texture_coordinates
+        .iter_mut()
+        .zip(&used.texture_coordinates);
     for statement in Statements::new(bytes) {
         let mut words = words(&statement.text);
         let read = match words.next() {
@@ -359,8 +363,8 @@ fn coordinates(bytes: &[u8], obj: &mut Obj, used: &Each<Vec<bool>>) -> Result<()
                 _ => Ok(()),
             },
             // v may be missing. A depth may follow it.
-            Some(b"vt") => match places.next() {
-                Some((place, true)) => numbers("vt", words, place, 1),
+            Some(b"vt") => match texture_coordinates.next() {
+                Some((uv, true)) => numbers("vt", words, uv, 1),
                 _ => Ok(()),
             },
             _ => Ok(()),
@@ -386,7 +390,7 @@ fn numbers<'a>(
                 break;
             }
             return Err(format!(
-                "'{keyword}' has {i} of its {least} numbers; add the others"
+                "'{keyword}' has {i} of {least} required numbers; add the missing numbers"
             ));
         };
         *number = self::number(word)?;
@@ -400,8 +404,8 @@ fn number(word: &[u8]) -> Result<f64, String> {
     let text = std::str::from_utf8(word).unwrap_or_default();
     let Some(number) = parse(text) else {
         let hint = match parse(&text.replacen(',', ".", 1)) {
-            Some(_) => "write a point, not a comma",
-            None => "write digits, like -0.5 or 1e-3",
+            Some(_) => "write a decimal point, not a comma",
+            None => "write a number such as -0.5 or 1e-3",
         };
         return Err(format!("{} is not a number; {hint}", quoted(word)));
     };
@@ -464,7 +468,7 @@ impl<'a> Statements<'a> {
     }
 
     /// Returns whether the next line begins a new statement.
-    fn begins_anew(&self) -> bool {
+    fn next_line_is_a_statement(&self) -> bool {
         let next = self.rest.unwrap_or_default();
         let end = next.iter().position(|byte| matches!(byte, b'\n' | b'\r'));
         let next = &next[..end.unwrap_or(next.len())];
@@ -474,7 +478,7 @@ impl<'a> Statements<'a> {
     }
 }
 
-/// Returns a line without the `\` at its end, or `None` if it has no `\` there or has a comment.
+/// Returns a line without the `\` at its end, or `None` if it has none there or has a comment.
 fn continued(line: &[u8]) -> Option<&[u8]> {
     let blanks = line.iter().rev().take_while(|byte| is_blank(byte)).count();
     let whole = line[..line.len() - blanks].strip_suffix(b"\\")?;
@@ -494,7 +498,7 @@ impl<'a> Iterator for Statements<'a> {
             let whole = from + whole.len();
             let joined = text.to_mut();
             joined.truncate(whole);
-            if self.begins_anew() {
+            if self.next_line_is_a_statement() {
                 break;
             }
             let Some(next) = self.line() else {
@@ -520,12 +524,12 @@ impl<'a> Iterator for Statements<'a> {
 mod tests {
     use super::*;
 
-    fn corner(position: u32, place: Option<u32>) -> Corner {
-        Corner { position, place }
+    fn corner(position: u32, uv: Option<u32>) -> ObjCorner {
+        ObjCorner { position, uv }
     }
 
     #[test]
-    fn all_ways_to_write_a_face_are_read() {
+    fn every_spelling_of_a_face_is_read() {
         let obj = parse(
             b"# a comment \\\n\
               mtllib some.mtl\r\n\
@@ -544,7 +548,10 @@ mod tests {
         )
         .unwrap();
         assert_eq!(obj.positions[2..4], [[1.0, 1.0, 0.0], [2.0, -0.5, 5.0]]);
-        assert_eq!(obj.places, [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
+        assert_eq!(
+            obj.texture_coordinates,
+            [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]
+        );
         let faces: Vec<_> = obj.faces.iter().map(|face| obj.corners_of(face)).collect();
         let bare = |positions: [u32; 3]| positions.map(|position| corner(position, None));
         assert_eq!(faces[0], bare([0, 1, 2]));
@@ -554,8 +561,8 @@ mod tests {
         assert_eq!(faces[3], four);
         assert_eq!(faces[4], bare([4, 0, 1]));
         assert_eq!(
-            obj.left_out.to_string(),
-            "3 statements left out (2 'l', 1 'p')"
+            obj.skipped.to_string(),
+            "3 statements skipped (2 'l', 1 'p')"
         );
         let lines: Vec<_> = obj.faces.iter().map(|face| face.line).collect();
         assert_eq!(lines, [12, 13, 17, 18, 19]);
@@ -564,13 +571,13 @@ mod tests {
     const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
 
     /// Returns the faces and coordinates of a text, without their lines.
-    fn read(text: &[u8]) -> (Vec<[f64; 3]>, Vec<[f64; 2]>, Vec<Corner>) {
+    fn read(text: &[u8]) -> (Vec<[f64; 3]>, Vec<[f64; 2]>, Vec<ObjCorner>) {
         let obj = parse(text).unwrap_or_else(|error| panic!("{}: {error}", text.escape_ascii()));
-        (obj.positions, obj.places, obj.corners)
+        (obj.positions, obj.texture_coordinates, obj.corners)
     }
 
     #[test]
-    fn lines_end_in_any_way_and_blanks_are_of_any_kind() {
+    fn any_line_ends_and_any_blanks_are_accepted() {
         let plain = read(TRIANGLE.as_bytes());
         for text in [
             format!("\u{feff}{TRIANGLE}"),
@@ -605,7 +612,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_face_uses_refuses_no_file() {
+    fn data_that_no_face_uses_is_never_an_error() {
         let plain = read(TRIANGLE.as_bytes());
         for more in [
             "vn nan nan nan",
@@ -618,10 +625,11 @@ mod tests {
             "usemtl \0",
             "# \0",
         ] {
-            let (mut positions, mut places, corners) = read(format!("{TRIANGLE}{more}").as_bytes());
+            let (mut positions, mut texture_coordinates, corners) =
+                read(format!("{TRIANGLE}{more}").as_bytes());
             positions.truncate(3);
-            places.truncate(3);
-            assert_eq!((positions, places, corners), plain, "{more:?}");
+            texture_coordinates.truncate(3);
+            assert_eq!((positions, texture_coordinates, corners), plain, "{more:?}");
         }
         for face in [
             "f 1/1/0 2/2/99 3/3/-99",
@@ -637,7 +645,7 @@ mod tests {
         // A face with a corner without texture coordinates gets projected coordinates.
         let mixed = TRIANGLE.replace("3/3", "3").replace("vt 1 0", "vt nan");
         let (_, _, corners) = read(mixed.as_bytes());
-        assert!(corners.iter().all(|corner| corner.place.is_none()));
+        assert!(corners.iter().all(|corner| corner.uv.is_none()));
         // Anything may follow the numbers that count.
         let behind = TRIANGLE.replace("v 1 0 0", "v 1 0 0 1.#J nan");
         let behind = behind.replace("vt 1 0", "vt 1 0 -nan(ind)");
@@ -646,29 +654,29 @@ mod tests {
 
     #[test]
     fn unknown_statements_are_counted_by_kind() {
-        let left_out = |more: &str| {
+        let skipped = |more: &str| {
             parse(format!("{TRIANGLE}{more}").as_bytes())
                 .unwrap()
-                .left_out
+                .skipped
         };
         assert_eq!(
-            left_out("vn 1\no\ng a\ns 1\nusemtl\nmtllib a b"),
-            LeftOut::default()
+            skipped("vn 1\no\ng a\ns 1\nusemtl\nmtllib a b"),
+            SkippedStatements::default()
         );
-        let tagged = left_out("t crease 2/1/0 1 2 2.0");
-        assert_eq!(tagged.to_string(), "1 statement left out (1 't')");
+        let tagged = skipped("t crease 2/1/0 1 2 2.0");
+        assert_eq!(tagged.to_string(), "1 statement skipped (1 't')");
         assert_eq!(tagged.kinds, [(b"t".to_vec(), 8, 1)]);
         let many =
-            left_out("vw 1\nt\nusemap a\nvw 2\ncstype b\ncurv 1\nsurf 1\nend\nend\n\x1b[0m\n");
-        let words = "10 statements left out (2 'vw', 1 't', 1 'usemap', 1 'cstype', 1 'curv', \
+            skipped("vw 1\nt\nusemap a\nvw 2\ncstype b\ncurv 1\nsurf 1\nend\nend\n\x1b[0m\n");
+        let expected = "10 statements skipped (2 'vw', 1 't', 1 'usemap', 1 'cstype', 1 'curv', \
                      1 'surf', 3 others)";
-        assert_eq!(many.to_string(), words);
-        let escape = left_out("\x1b[0m").to_string();
-        assert_eq!(escape, r"1 statement left out (1 '\x1b[0m')");
+        assert_eq!(many.to_string(), expected);
+        let escape = skipped("\x1b[0m").to_string();
+        assert_eq!(escape, r"1 statement skipped (1 '\x1b[0m')");
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_line() {
+    fn errors_name_the_line_and_the_reason() {
         let numbers = |word: &str| format!("v 0 0 0\nv 0 0 {word}\nf 1 2 1");
         let mut cases: Vec<(String, usize, &str)> = Vec::new();
         for (word, why) in [
@@ -680,7 +688,10 @@ mod tests {
             ("1.0abc", "'1.0abc' is not a number"),
             ("0x10", "'0x10' is not a number"),
             ("1_0", "'1_0' is not a number"),
-            ("1,5", "'1,5' is not a number; write a point, not a comma"),
+            (
+                "1,5",
+                "'1,5' is not a number; write a decimal point, not a comma",
+            ),
             ("1#", "'1#' is not a number"),
             ("1\0", "'1\\x00' is not a number"),
             ("1\u{a0}", "'1\\u{a0}' is not a number"),
@@ -689,8 +700,8 @@ mod tests {
             ("infinity", "'infinity' is not within"),
             ("1e999", "'1e999' is not within"),
             ("1e31", "'1e31' is not within"),
-            ("", "'v' has 2 of its 3 numbers"),
-            ("#1", "'v' has 2 of its 3 numbers"),
+            ("", "'v' has 2 of 3 required numbers"),
+            ("#1", "'v' has 2 of 3 required numbers"),
         ] {
             cases.push((numbers(word), 2, why));
         }
@@ -698,7 +709,7 @@ mod tests {
             (
                 "vt\nv 0 0 0\nf 1/1 1/1 1/1",
                 1,
-                "'vt' has 0 of its 1 numbers",
+                "'vt' has 0 of 1 required numbers",
             ),
             ("vt NaN 0\nv 0 0 0\nf 1/1 1/1 1/1", 1, "'NaN' is not within"),
             (
@@ -709,12 +720,12 @@ mod tests {
             (
                 "v 0 0 0\nf 0 1 1",
                 2,
-                "'0': the position 0 does not exist; count from 1",
+                "'0': the position 0 does not exist; indices count from 1",
             ),
             (
                 "v 0 0 0\nf 1 -2 1",
                 2,
-                "'-2': the position -2 does not exist: 1 come before this line",
+                "'-2': the position -2 does not exist: the file has 1 before this line",
             ),
             (
                 "v 0 0 0\nf 1/1 1/1 1/1",
@@ -724,7 +735,7 @@ mod tests {
             (
                 "v 0 0 0\nf 1/-1 1 1",
                 2,
-                "the texture coordinate -1 does not exist: 0 come before",
+                "the texture coordinate -1 does not exist: the file has 0 before",
             ),
             ("v 0 0 0\nf 1.5 1 1", 2, "'1.5' is not a whole number"),
             ("v 0 0 0\nf a 1 1", 2, "'a' is not a whole number"),
@@ -743,7 +754,7 @@ mod tests {
             (
                 "v 0 0 0\nf 1 -9223372036854775808 1",
                 2,
-                "1 come before this line",
+                "the file has 1 before this line",
             ),
             ("\nf 1 1\\\n 1 \\", 2, "the file ends here"),
             // No faces: the error names the first line that does not belong in an OBJ.
@@ -766,14 +777,14 @@ mod tests {
     }
 
     #[test]
-    fn limits_refuse_what_would_take_memory_or_time() {
+    fn files_beyond_the_limits_are_refused() {
         let corners = |count: usize| format!("v 0 0 0\nf{}\n", " 1".repeat(count));
         assert!(parse(corners(MAX_CORNERS).as_bytes()).is_ok());
         let error = parse(corners(MAX_CORNERS + 1).as_bytes()).unwrap_err();
         assert!(
             error
                 .why
-                .starts_with("the face has 2049 corners, and a face has at most 2048;")
+                .starts_with("the face has 2049 corners, but at most 2048 are allowed;")
         );
         assert_eq!(error.line, 2);
         let error =
@@ -782,7 +793,7 @@ mod tests {
         assert!(
             error
                 .why
-                .starts_with("here the file has 1048577 faces and 0 corners"),
+                .starts_with("up to this line the file has 1048577 faces and 0 corners"),
             "{error}"
         );
         let face = format!("f{}\n", " 1".repeat(MAX_CORNERS));
@@ -790,7 +801,7 @@ mod tests {
         assert!(
             error
                 .why
-                .contains("more than the 1048576 and 4194304 that are read"),
+                .contains("at most 1048576 faces and 4194304 corners are allowed"),
             "{error}"
         );
     }

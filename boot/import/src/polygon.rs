@@ -25,9 +25,9 @@ pub const RADIUS: f64 = 1.2;
 /// One unit on the mesh's grid.
 pub(crate) const GRID: f64 = 65_536.0;
 
-/// What happened to the file's faces.
+/// Counts of the file's faces that were not imported unchanged.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Tally {
+pub struct FaceCounts {
     /// Faces without an area, which were dropped.
     pub degenerate: usize,
     /// Faces that were cut into triangles, because they are not convex, not flat, have too many corners or
@@ -40,7 +40,7 @@ pub struct Tally {
 /// A polygon on the grid, with an area, clockwise when seen from its front.
 #[derive(Clone, Debug)]
 pub struct Polygon {
-    pub(crate) ring: Vec<Place>,
+    pub(crate) ring: Vec<PolygonCorner>,
     pub(crate) normal: [f64; 3],
     /// The line of the face in the file.
     pub line: usize,
@@ -48,7 +48,7 @@ pub struct Polygon {
 
 /// A corner of a polygon.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct PolygonCorner {
     pub(crate) vertex: usize,
     /// The position on the mesh's grid.
     pub(crate) at: [f64; 3],
@@ -96,7 +96,7 @@ pub struct Polygons {
     pub(crate) vertices: Vec<Vec3>,
     /// The polygons that have an area.
     pub polygons: Vec<Polygon>,
-    pub(crate) tally: Tally,
+    pub(crate) counts: FaceCounts,
 }
 
 impl Polygons {
@@ -107,10 +107,10 @@ impl Polygons {
     pub fn new(obj: &Obj) -> anyhow::Result<Self> {
         ensure!(
             !obj.faces.is_empty(),
-            "it has no faces (lines such as 'f 1 2 3'), {} vertices, and {}; export the model as \
-             polygons",
+            "the file has no faces (lines such as 'f 1 2 3'), but {} vertices, and {}; export the model \
+             as polygons",
             obj.positions.len(),
-            obj.left_out
+            obj.skipped
         );
         let corners = obj.corners.iter();
         let used: Vec<_> = corners
@@ -146,12 +146,12 @@ impl Polygons {
                         this.vertices.push(point);
                         this.vertices.len() - 1
                     });
-                    Place {
+                    PolygonCorner {
                         vertex,
                         at: point.map(f64::from),
                         // v points up in the file.
-                        uv: corner.place.map_or([f64::NAN; 2], |place| {
-                            let [u, v] = obj.places[place as usize];
+                        uv: corner.uv.map_or([f64::NAN; 2], |place| {
+                            let [u, v] = obj.texture_coordinates[place as usize];
                             [u, -v]
                         }),
                     }
@@ -162,7 +162,7 @@ impl Polygons {
                 ring.pop();
             }
             let Some(normal) = normal(&ring) else {
-                this.tally.degenerate += 1;
+                this.counts.degenerate += 1;
                 continue;
             };
             let mut polygon = Polygon {
@@ -172,7 +172,7 @@ impl Polygons {
             };
             if polygon.along(0).any(f64::is_nan) {
                 polygon.project();
-                this.tally.projected += 1;
+                this.counts.projected += 1;
             }
             this.polygons.push(polygon);
             for (what, count, most, all) in [
@@ -196,7 +196,7 @@ impl Polygons {
         }
         ensure!(
             !this.polygons.is_empty(),
-            "none of its {} faces has an area; check its vertices",
+            "none of the {} faces has an area; check the vertices",
             obj.faces.len()
         );
         Ok(this)
@@ -204,7 +204,7 @@ impl Polygons {
 }
 
 /// Returns the unit normal on the side from which the ring is clockwise, or `None` if the ring has no area.
-fn normal(ring: &[Place]) -> Option<[f64; 3]> {
+fn normal(ring: &[PolygonCorner]) -> Option<[f64; 3]> {
     let mut sum = [0.0; 3];
     // Relative to the first corner, so that the terms are as small as the polygon.
     for pair in ring.windows(2).skip(1) {

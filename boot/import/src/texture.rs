@@ -8,7 +8,7 @@ use png::{BitDepth, ColorType, Decoder, Transformations};
 
 use system::quote::quoted;
 
-use crate::kind;
+use crate::file_kind;
 
 /// The first bytes of every PNG.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -19,7 +19,7 @@ pub const MAX_PIXELS: u32 = 8192;
 pub const GROUND: [u8; 3] = [128; 3];
 /// An opaque image.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Image {
+pub struct OpaqueImage {
     /// The pixels, blended over [`GROUND`] where they are transparent.
     pub pixels: RgbImage,
     /// Whether a part of the image was transparent.
@@ -34,21 +34,26 @@ pub struct Image {
 ///
 /// # Errors
 /// If the file has another format, which the message names, is damaged, or is larger than [`MAX_PIXELS`].
-pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Image> {
-    let begin = from.fill_buf().context("it cannot be read")?;
+pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<OpaqueImage> {
+    let begin = from.fill_buf().context("cannot be read")?;
     if !begin.starts_with(PNG) {
-        match kind::name(begin, None) {
-            Some(kind) => bail!("its content is {kind}, not PNG; convert it to PNG"),
-            None if begin.is_empty() => bail!("it is empty; give a PNG"),
-            None => bail!("it begins with {}, not as a PNG; give a PNG", quoted(begin)),
+        match file_kind::of(begin, None) {
+            Some(kind) => bail!("the file is {kind}, not a PNG; convert it to PNG"),
+            None if begin.is_empty() => bail!("the file is empty; pass a PNG"),
+            None => bail!(
+                "the file begins with {}, unlike every PNG; pass a PNG",
+                quoted(begin)
+            ),
         }
     }
     let damaged = |error| match error {
         // This limit applies to the file's metadata, not to its pixels.
         png::DecodingError::LimitsExceeded => {
-            anyhow!("its header or its notes ask for too much memory; save it again, without notes")
+            anyhow!(
+                "the header or the metadata needs too much memory; save the PNG again without metadata"
+            )
         }
-        error => anyhow!("it is not a whole PNG: {error}; save it again"),
+        error => anyhow!("the PNG is damaged: {error}; save it again"),
     };
     let mut decoder = Decoder::new(from);
     decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
@@ -59,8 +64,8 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Image> {
     let (width, height) = (header.width, header.height);
     ensure!(
         width <= MAX_PIXELS && height <= MAX_PIXELS,
-        "it has {width} x {height} pixels, and a texture has at most {MAX_PIXELS} a side; scale it \
-         down"
+        "the PNG has {width} x {height} pixels, but at most {MAX_PIXELS} on a side are allowed; scale \
+         it down"
     );
     let mut reader = decoder.read_info().map_err(damaged)?;
     let info = reader.info();
@@ -69,20 +74,22 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<Image> {
     let bytes = info.palette.as_deref().unwrap_or_default().len();
     ensure!(
         bytes.is_multiple_of(3),
-        "its palette has {bytes} bytes, not three for each colour; save it again"
+        "the palette has {bytes} bytes, but needs three for each colour; save the PNG again"
     );
-    let size = reader.output_buffer_size().context("it is too large")?;
+    let size = reader
+        .output_buffer_size()
+        .context("the PNG is too large")?;
     let mut bytes = vec![0; size];
     let frame = reader.next_frame(&mut bytes).map_err(damaged)?;
     ensure!(
         frame.bit_depth == BitDepth::Eight && (frame.width, frame.height) == (width, height),
-        "its first image is not of its header's size; save it again"
+        "the first image does not have the size in the header; save the PNG again"
     );
     Ok(over_ground(bytes, frame.color_type, (width, height)))
 }
 
 /// Blends a decoder's pixels, with 8 bits a component, over [`GROUND`].
-fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32)) -> Image {
+fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32)) -> OpaqueImage {
     let pixels = width as usize * height as usize;
     let samples = colour.samples();
     let mut transparent = false;
@@ -114,7 +121,7 @@ fn over_ground(mut bytes: Vec<u8>, colour: ColorType, (width, height): (u32, u32
     }
     bytes.truncate(3 * pixels);
     let pixels = RgbImage::from_raw(width, height, bytes);
-    Image {
+    OpaqueImage {
         pixels: pixels.expect("three bytes a pixel"),
         transparent,
     }
@@ -151,12 +158,12 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_of_png_is_read_right() {
+    fn every_kind_of_png_is_read_correctly() {
         let palette: &[u8] = &[10, 20, 30, 40, 50, 60, 70, 80, 90];
         let grey = |values: &[u8]| values.iter().flat_map(|&v| [v; 3]).collect::<Vec<_>>();
         use BitDepth::{Eight, Four, One, Sixteen, Two};
         use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
-        let whole: &[(ColorType, BitDepth, &[u8], Vec<u8>)] = &[
+        let opaque: &[(ColorType, BitDepth, &[u8], Vec<u8>)] = &[
             (Grayscale, One, &[0b1010_0000], grey(&[255, 0, 255])),
             (Grayscale, Two, &[0b0001_1100], grey(&[0, 85, 255])),
             (Grayscale, Four, &[0x0f, 0x80], grey(&[0, 255, 136])),
@@ -196,7 +203,7 @@ mod tests {
                 (1..10).collect(),
             ),
         ];
-        for (colour, depth, rows, pixels) in whole {
+        for (colour, depth, rows, pixels) in opaque {
             let bytes = encoded((3, 1), *colour, *depth, rows, |encoder| {
                 if *colour == Indexed {
                     encoder.set_palette(palette);
@@ -231,15 +238,15 @@ mod tests {
     }
 
     #[test]
-    fn what_is_transparent_is_grey_and_what_hides_there_is_gone() {
+    fn transparent_pixels_are_blended_with_grey_and_their_colours_vanish() {
         use BitDepth::{Eight, Sixteen, Two};
         use ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
         let [ground, ..] = GROUND;
         // 128/255 of white, and the rest of the ground.
         let half = ((255 * 128 + u32::from(ground) * 127 + 127) / 255) as u8;
         let clear: &[u8] = &[ground; 3];
-        type Case<'a> = (ColorType, BitDepth, &'a [u8], &'a [u8], Vec<u8>);
-        let cases: &[Case] = &[
+        type TransparentPng<'a> = (ColorType, BitDepth, &'a [u8], &'a [u8], Vec<u8>);
+        let cases: &[TransparentPng] = &[
             (
                 Rgba,
                 Eight,
@@ -314,7 +321,7 @@ mod tests {
         let bytes = encoded((300, 300), Rgba, Eight, &hidden, |_| {});
         let face = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n";
         let face = crate::obj::parse(face).unwrap();
-        let (_, layout) = crate::solid(&face, (300, 300)).unwrap();
+        let (_, layout) = crate::make_mesh(&face, (300, 300)).unwrap();
         let texels = layout.cut_scaled(&read(Cursor::new(bytes)).unwrap().pixels);
         assert!(texels.iter().all(|texel| texel.0 == GROUND));
     }

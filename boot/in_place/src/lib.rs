@@ -1,4 +1,4 @@
-//! Large values on the heap that never pass over the stack.
+//! Builds large values on the heap without a copy on the stack.
 //!
 //! `Box::new(Large::new())` builds its argument on the stack unless the compiler optimises that away, and a
 //! thread has 2 MiB of stack or less. [`boxed!`] copies an empty value from a static to the heap in one
@@ -7,7 +7,7 @@
 
 use std::ops::{Deref, DerefMut};
 use std::slice;
-/// For [`boxed!`], which crates without `std` use as well.
+/// Used by [`boxed!`], also in crates without `std`.
 #[doc(hidden)]
 pub use std::sync::Mutex;
 

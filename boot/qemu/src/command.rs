@@ -14,21 +14,14 @@ use anyhow::Context;
 use protocol::Exit;
 use rustix::process::Pid;
 
-use super::Config;
+use super::config::Config;
 use super::option::names_accelerator;
-use super::run::Event;
+use super::run::VmEvent;
 use system::child;
 
 /// File descriptors of QEMU's ends of the sockets, as its command line names them.
-const CONTROL: i32 = 3;
-const SERIAL: i32 = 4;
-
-/// A shell script that moves the sockets from standard input and output to [`CONTROL`] and [`SERIAL`].
-///
-/// The standard library passes only the standard descriptors to a child. A descriptor that every child
-/// inherits would also reach the children of other threads, and this program would then not notice that QEMU
-/// has closed its end.
-const MOVE_SOCKETS: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >&2"#;
+const CONTROL: i32 = child::SOCKETS[0];
+const SERIAL: i32 = child::SOCKETS[1];
 
 /// Returns QEMU's arguments.
 pub fn arguments(config: &Config) -> Vec<OsString> {
@@ -60,6 +53,13 @@ pub fn arguments(config: &Config) -> Vec<OsString> {
     words
 }
 
+impl Config {
+    /// Returns QEMU's command line as a user would type it in a shell.
+    pub fn command_line(&self) -> String {
+        child::line(Command::new(&self.qemu).args(arguments(self)))
+    }
+}
+
 /// Escapes a path for the value of a QEMU option: QEMU reads two commas as one.
 fn escaped(path: &Path) -> String {
     path.to_string_lossy().replace(',', ",,")
@@ -75,18 +75,18 @@ pub struct Started {
 /// Starts QEMU on a thread that lives as long as QEMU. If this program dies, a signal ends QEMU, and that
 /// signal is tied to the thread that started QEMU. The thread sends QEMU's output and its exit status as
 /// events.
-pub fn start(qemu: &Path, arguments: &[OsString], send: Sender<Event>) -> anyhow::Result<Started> {
-    let (control, qemu_control) = UnixStream::pair().context("no socket for QEMU")?;
-    let (serial, qemu_serial) = UnixStream::pair().context("no socket for QEMU")?;
-    let mut command = child::command("sh");
-    command.args(["-c", MOVE_SOCKETS, "sh"]);
-    command.arg(qemu).args(arguments);
+pub fn start(
+    qemu: &Path,
+    arguments: &[OsString],
+    send: Sender<VmEvent>,
+) -> anyhow::Result<Started> {
+    let (control, qemu_control) = UnixStream::pair().context("no socket can be made for QEMU")?;
+    let (serial, qemu_serial) = UnixStream::pair().context("no socket can be made for QEMU")?;
+    let mut command =
+        child::command_with_sockets(qemu, [qemu_control, qemu_serial].map(OwnedFd::from));
+    command.args(arguments);
     // A separate process group: Ctrl-C reaches this program, which then ends QEMU.
-    command
-        .process_group(0)
-        .stdin(OwnedFd::from(qemu_control))
-        .stdout(OwnedFd::from(qemu_serial))
-        .stderr(Stdio::piped());
+    command.process_group(0).stderr(Stdio::piped());
     let (started, wait) = mpsc::channel();
     thread::spawn(move || {
         let spawned = command.spawn();
@@ -101,24 +101,21 @@ pub fn start(qemu: &Path, arguments: &[OsString], send: Sender<Event>) -> anyhow
             }
         };
         let _ = started.send(Ok(Pid::from_child(&child)));
-        if let Some(words) = child.stderr.take() {
-            for line in BufReader::new(words).lines().map_while(Result::ok) {
-                let _ = send.send(Event::Words(line));
+        if let Some(output) = child.stderr.take() {
+            for line in BufReader::new(output).lines().map_while(Result::ok) {
+                let _ = send.send(VmEvent::Output(line));
             }
         }
-        let _ = send.send(Event::Ended(child.wait()));
+        let _ = send.send(VmEvent::Ended(child.wait()));
     });
-    let started = wait.recv().context("the thread that starts QEMU is gone")?;
+    let started = wait
+        .recv()
+        .context("the thread that starts QEMU has ended")?;
     Ok(Started {
         process: started.context("QEMU cannot be started")?,
         control,
         serial,
     })
-}
-
-/// Returns the command line as a user would type it in a shell.
-pub fn line(qemu: &Path, arguments: &[OsString]) -> String {
-    child::line(Command::new(qemu).args(arguments)) + "\n"
 }
 
 #[cfg(test)]
@@ -139,8 +136,8 @@ mod tests {
     }
 
     #[test]
-    fn accelerator_of_the_user_replaces_ours() {
-        let ours = |arguments: &[&str]| {
+    fn the_users_accelerator_replaces_tcg() {
+        let uses_tcg = |arguments: &[&str]| {
             let words = super::arguments(&config(arguments));
             words.windows(2).any(|pair| pair == ["-accel", "tcg"])
         };
@@ -155,7 +152,7 @@ mod tests {
             &["-m", "64", "-M", "q35,accel=tcg"],
             &["-machine", "q35", "-machine", "accel=xen"],
         ] {
-            assert!(!ours(named), "{named:?}");
+            assert!(!uses_tcg(named), "{named:?}");
         }
         for unnamed in [
             &[][..],
@@ -165,15 +162,15 @@ mod tests {
             &["-cpu", "max"],
             &["-machine"],
         ] {
-            assert!(ours(unnamed), "{unnamed:?}");
+            assert!(uses_tcg(unnamed), "{unnamed:?}");
         }
     }
 
     #[test]
-    fn command_line_holds_the_users_arguments_last_and_escapes_the_path() {
+    fn the_users_arguments_come_last_and_the_images_path_is_escaped() {
         let words = super::arguments(&config(&["-m", "64"]));
         assert_eq!(words[words.len() - 2..], ["-m", "64"]);
-        let line = line(Path::new("qemu"), &words);
+        let line = config(&["-m", "64"]).command_line();
         assert!(line.starts_with("qemu -name 'Crystal Ball' "), "{line}");
         assert!(line.contains("file=a,,b.img "), "{line}");
     }

@@ -10,11 +10,28 @@
 //! QEMU's exit code 0 is not a source: a triple fault, a closed window and a QEMU that was ended by a signal
 //! all give it.
 //!
+//! The command line of a configuration needs no boot:
+//!
+//! ```
+//! use setup::{Qemu, Ready};
+//!
+//! let qemu = Qemu {
+//!     path: "qemu-system-x86_64".into(),
+//!     version: "7.2.0".into(),
+//!     displays: vec!["none".into()],
+//! };
+//! let ready = Ready { image: "demo.img".into(), kernel: "kernel".into(), qemu };
+//! let line = qemu::Config::new(&ready).command_line();
+//! assert!(line.starts_with("qemu-system-x86_64 -name 'Crystal Ball' -net none"));
+//! assert!(line.contains("file=demo.img"));
+//! ```
+//!
 //! QEMU runs with `-no-reboot -no-shutdown`: after a reset it keeps the machine stopped and does not exit, so
 //! a last screendump can be taken. Threads only read (the serial line, QMP, QEMU's output, its exit status)
 //! and feed one channel. The caller's thread makes every decision.
 
 mod command;
+mod config;
 mod option;
 mod qmp;
 mod run;
@@ -37,97 +54,31 @@ use rustix::fs::MemfdFlags;
 use rustix::process::{Pid, Signal, kill_process_group};
 use serde_json::{Value, json};
 
+pub use config::{Config, Limits};
 use qmp::Control;
-use run::{Act, Event, Run};
+use run::{Reaction, RunState, VmEvent};
 use verdict::Evidence;
-pub use verdict::{Failure, Found, Verdict};
+pub use verdict::{BootDiagnosis, Failure, Verdict};
 use watchdog::Watchdog;
 
 use frames::backend::Backend;
 use frames::dump::Dump;
 use frames::rgb::RgbImage;
-use setup::Ready;
 use system::quote::quoted;
 use system::{Interrupted, interrupted};
 
-/// How often [`Machine::watch`] checks that the running demo still answers.
+/// How often [`Vm::watch`] checks that the running demo still answers.
 const HEARTBEAT: Duration = Duration::from_secs(5);
 /// Longest wait between two checks for Ctrl-C.
-const LOOK_UP: Duration = Duration::from_millis(50);
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How long a run may keep this program waiting.
-///
-/// A limit counts the processor time that QEMU uses. An idle QEMU reaches the limit by wall time, and after
-/// 15 times the limit of wall time the wait ends in any case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Limits {
-    /// From QEMU's start to the kernel's first line.
-    pub boot: Duration,
-    /// For each answer of the kernel or of QEMU, and for QEMU's end.
-    pub answer: Duration,
-    /// For a user's pause of the machine while this program waits for an answer; wall time.
-    pub pause: Duration,
-}
-
-impl Default for Limits {
-    /// Returns at least ten times the time of each step on a quiet machine: 1.2 s for a boot, 1 s for a
-    /// dump of all video memory. (A boot from an IDE disk, which this crate does not use, needs 2.5 s.) A
-    /// pause may last an hour.
-    fn default() -> Self {
-        Self {
-            boot: Duration::from_secs(20),
-            answer: Duration::from_secs(10),
-            pause: Duration::from_secs(3600),
-        }
-    }
-}
-
-/// What to boot, and how.
-#[derive(Clone, Debug)]
-pub struct Config {
-    /// QEMU's program.
-    pub qemu: PathBuf,
-    /// The disk image.
-    pub image: PathBuf,
-    /// The value of QEMU's `-vga`.
-    pub vga: String,
-    /// The value of QEMU's `-display`; `none` for no window.
-    pub display: String,
-    /// The checksum of the model file that the kernel must accept. If it is `None`, the kernel may refuse the
-    /// model file; its answer is kept either way ([`Machine::said_of_pack`]).
-    pub model_file: Option<u32>,
-    /// More arguments for QEMU.
-    pub arguments: Vec<OsString>,
-    /// The folder for evidence: each failure gets a new folder in it.
-    pub failures: PathBuf,
-    /// How long to wait for the machine.
-    pub limits: Limits,
-}
-
-impl Config {
-    /// Returns the configuration for the image on QEMU's standard adapter, without a window. Evidence is kept
-    /// in a folder beside the image.
-    pub fn new(ready: &Ready) -> Self {
-        Self {
-            qemu: ready.qemu.path.clone(),
-            image: ready.image.clone(),
-            vga: "std".into(),
-            display: "none".into(),
-            model_file: None,
-            arguments: Vec::new(),
-            failures: ready.image.with_file_name("failures"),
-            limits: Limits::default(),
-        }
-    }
-}
-
-/// A QEMU that runs the image. Dropping it ends QEMU.
+/// A virtual machine: a QEMU that runs the image. Dropping it ends QEMU.
 ///
 /// Nothing remains in the file system, however this program ends: QEMU inherits its sockets, and the log and
 /// the screendumps are files without a name.
 #[derive(Debug)]
-pub struct Machine {
-    events: Receiver<Event>,
+pub struct Vm {
+    events: Receiver<VmEvent>,
     serial: UnixStream,
     control: Control,
     process: Pid,
@@ -137,7 +88,7 @@ pub struct Machine {
     limits: Limits,
     /// The watchdog for QEMU's end, once the machine is off.
     ending: Option<Watchdog>,
-    run: Run,
+    run: RunState,
 }
 
 /// The text that QEMU printed when its arguments asked for a list (`-machine help`) and it started no
@@ -155,7 +106,7 @@ impl std::fmt::Display for Printed {
 
 impl std::error::Error for Printed {}
 
-impl Machine {
+impl Vm {
     /// Starts QEMU and waits for the kernel's first line.
     ///
     /// # Errors
@@ -165,11 +116,11 @@ impl Machine {
         Self::boot_through(config, |serial| serial)
     }
 
-    /// Starts QEMU like [`Machine::boot`], with an intermediary on the serial line: `tap` receives QEMU's end
+    /// Starts QEMU like [`Vm::boot`], with an intermediary on the serial line: `tap` receives QEMU's end
     /// of the line and returns the stream to use in its place.
     ///
     /// # Errors
-    /// As [`Machine::boot`].
+    /// As [`Vm::boot`].
     pub fn boot_through(
         config: &Config,
         tap: impl FnOnce(UnixStream) -> UnixStream,
@@ -178,7 +129,7 @@ impl Machine {
             |word: &OsString| word.to_str().and_then(option::option) == Some("daemonize");
         if config.arguments.iter().any(daemonize) {
             bail!(
-                "-daemonize: QEMU must stay this program's child, or nothing could end it; leave it out"
+                "-daemonize: not supported, because this program could not end such a QEMU; leave the option out"
             );
         }
         let (send, events) = mpsc::channel();
@@ -186,8 +137,8 @@ impl Machine {
         let started = command::start(&config.qemu, &arguments, send.clone())?;
         let (control, serial) = (started.control, tap(started.serial));
         // If the other side stops reading, a write must not block the checks for Ctrl-C.
-        control.set_write_timeout(Some(LOOK_UP))?;
-        serial.set_write_timeout(Some(LOOK_UP))?;
+        control.set_write_timeout(Some(POLL_INTERVAL))?;
+        serial.set_write_timeout(Some(POLL_INTERVAL))?;
         // On a full disk only the log is lost; the run continues.
         let log = tempfile::tempfile().ok();
         read_control(control.try_clone()?, send.clone());
@@ -203,14 +154,14 @@ impl Machine {
             process: started.process,
             arguments: config.arguments.clone(),
             evidence: Evidence {
-                command: command::line(&config.qemu, &arguments),
+                command: config.command_line() + "\n",
                 serial: log,
                 screen: None,
             },
             failures: config.failures.clone(),
             limits: config.limits,
             ending: None,
-            run: Run::default(),
+            run: RunState::default(),
         };
         machine.run.asked_for_list = config.arguments.iter().any(|word| word == "help");
         machine.negotiate()?;
@@ -218,8 +169,8 @@ impl Machine {
         while !machine.run.hello {
             if !machine.pump_or_wait(&mut watchdog)? {
                 let reset = machine.run.was_reset();
-                let found = Found::default();
-                return Err(machine.fail(Verdict::BootLoader { reset, found }));
+                let diagnosis = BootDiagnosis::default();
+                return Err(machine.fail(Verdict::BootLoader { reset, diagnosis }));
             }
         }
         if let Some(model_file) = config.model_file {
@@ -234,21 +185,21 @@ impl Machine {
         while self.run.model_file.is_none() {
             if !self.pump_or_wait(&mut watchdog)? {
                 return Err(self.fail(Verdict::Hang {
-                    waited_for: "what the kernel says of the model".into(),
+                    waited_for: "the kernel's line about the model file".into(),
                 }));
             }
         }
-        match self.said_of_pack() {
-            Some(said) if said == format!("{LOADED} model {model_file:08x}") => Ok(()),
-            said => bail!(
-                "the kernel should have taken the model file {model_file:08x}, and says '{}'",
-                said.unwrap_or_default()
+        match self.model_answer() {
+            Some(answer) if answer == format!("{LOADED} model {model_file:08x}") => Ok(()),
+            answer => bail!(
+                "model file {model_file:08x}: the kernel did not accept it and answered '{}'",
+                answer.unwrap_or_default()
             ),
         }
     }
 
     /// Returns the kernel's line about the model file in its ramdisk: accepted, or refused with the reason.
-    pub fn said_of_pack(&self) -> Option<&str> {
+    pub fn model_answer(&self) -> Option<&str> {
         self.run.model_file.as_deref()
     }
 
@@ -318,7 +269,7 @@ impl Machine {
                     self.pump(Instant::now())?;
                     if self.is_over(&mut watchdog) {
                         return Err(self.fail(Verdict::Hang {
-                            waited_for: "the kernel's reading of what it is sent".into(),
+                            waited_for: "room in the kernel's serial buffer".into(),
                         }));
                     }
                 }
@@ -335,7 +286,7 @@ impl Machine {
     /// Sends text as a line with its checksum.
     ///
     /// # Errors
-    /// As [`Machine::send_raw`].
+    /// As [`Vm::send_raw`].
     pub fn send_line(&mut self, text: &str) -> anyhow::Result<()> {
         let mut framed = Vec::new();
         protocol::write_line(format_args!("{text}"), |bytes| {
@@ -378,7 +329,7 @@ impl Machine {
         let arguments = json!({ "name": event, "enable": on });
         let answer = self.control("trace-event-set-state", arguments)?;
         match answer.get("error") {
-            Some(error) => Err(anyhow!("QEMU does not trace '{event}': {error}")),
+            Some(error) => Err(anyhow!("trace event '{event}': QEMU refused it: {error}")),
             None => Ok(()),
         }
     }
@@ -392,7 +343,7 @@ impl Machine {
         let events = json!({ "events": [{ "type": "key", "data": key }] });
         let answer = self.control("input-send-event", events)?;
         match answer.get("error") {
-            Some(error) => Err(anyhow!("QEMU does not send the key '{name}': {error}")),
+            Some(error) => Err(anyhow!("key '{name}': QEMU refused it: {error}")),
             None => Ok(()),
         }
     }
@@ -445,7 +396,7 @@ impl Machine {
                         waited_for: "QEMU's end".into(),
                     }));
                 }
-                Err(error) if error.downcast_ref() == Some(&Left) => return Ok(()),
+                Err(error) if error.downcast_ref() == Some(&KernelLeft) => return Ok(()),
                 Err(error) => return Err(error),
             }
         }
@@ -469,10 +420,10 @@ impl Machine {
                 }
             }
             if !self.pump_or_wait(&mut watchdog)? {
-                let mut words = self.run.words.clone();
-                words.push(format!("(it does not answer '{execute}')"));
+                let mut output = self.run.output.clone();
+                output.push(format!("(QEMU does not answer '{execute}')"));
                 let status = self.run.ended;
-                return Err(self.fail(Verdict::Qemu { words, status }));
+                return Err(self.fail(Verdict::Qemu { output, status }));
             }
         }
     }
@@ -491,7 +442,7 @@ impl Machine {
     /// Returns false if `watchdog` is over before an event comes, or if events keep coming beyond the
     /// watchdog's ceiling.
     fn pump_or_wait(&mut self, watchdog: &mut Watchdog) -> anyhow::Result<bool> {
-        while !self.pump(Instant::now() + LOOK_UP)? {
+        while !self.pump(Instant::now() + POLL_INTERVAL)? {
             if self.is_over(watchdog) {
                 return Ok(false);
             }
@@ -526,7 +477,9 @@ impl Machine {
             if self.run.is_decided() {
                 return Err(self.judge());
             }
-            let wait = by.saturating_duration_since(Instant::now()).min(LOOK_UP);
+            let wait = by
+                .saturating_duration_since(Instant::now())
+                .min(POLL_INTERVAL);
             match self.events.recv_timeout(wait) {
                 Ok(event) => break event,
                 Err(RecvTimeoutError::Timeout) if Instant::now() >= by => return Ok(false),
@@ -534,7 +487,7 @@ impl Machine {
                 Err(RecvTimeoutError::Disconnected) => return Err(self.judge()),
             }
         };
-        self.take(event);
+        self.handle(event);
         if self.run.is_decided() {
             return Err(self.judge());
         }
@@ -542,17 +495,17 @@ impl Machine {
     }
 
     /// Handles an event and carries out the action that follows from it.
-    fn take(&mut self, event: Event) {
+    fn handle(&mut self, event: VmEvent) {
         // If a write fails, QEMU is ending, and the next event is its end.
-        match self.run.take(event) {
-            Some(Act::Quit) => {
+        match self.run.handle(event) {
+            Some(Reaction::Quit) => {
                 let _ = self.control.send("quit", json!({}));
                 self.ending = Some(Watchdog::new(self.process, self.limits.answer));
             }
-            Some(Act::AskStatus) => {
+            Some(Reaction::AskStatus) => {
                 let _ = self.control.send("query-status", json!({}));
             }
-            Some(Act::Acknowledge) => {
+            Some(Reaction::Acknowledge) => {
                 self.keep_screen();
                 // The kernel waits for this byte before it ends QEMU.
                 let _ = self.serial.write_all(&[protocol::ACKNOWLEDGE]);
@@ -567,7 +520,7 @@ impl Machine {
             return Printed(text).into();
         }
         match self.run.verdict() {
-            Ok(()) => Left.into(),
+            Ok(()) => KernelLeft.into(),
             Err(verdict) => self.fail(verdict),
         }
     }
@@ -577,8 +530,8 @@ impl Machine {
         if verdict == Verdict::User {
             return Failure::plain(verdict).into();
         }
-        if let Verdict::BootLoader { found, .. } = &mut verdict {
-            *found = self.examine();
+        if let Verdict::BootLoader { diagnosis, .. } = &mut verdict {
+            *diagnosis = self.examine();
         }
         if self.run.ended.is_none() {
             self.keep_screen();
@@ -588,7 +541,7 @@ impl Machine {
     }
 
     /// Asks QEMU about the machine: memory, CPU, text screen. An answer that does not come is left empty.
-    fn examine(&mut self) -> Found {
+    fn examine(&mut self) -> BootDiagnosis {
         let memory = self.request("query-memory-size-summary", json!({}));
         let cpus = self.request("query-cpus-fast", json!({}));
         let cpu = cpus.and_then(|cpus| Some(cpus[0]["qom-path"].as_str()?.to_string()));
@@ -599,7 +552,7 @@ impl Machine {
         // 25 lines of 80 characters in the colour adapter's memory.
         let text = json!({ "val": 0xB_8000, "size": 2 * 80 * 25 });
         let text = self.request_file("pmemsave", text).unwrap_or_default();
-        Found {
+        BootDiagnosis {
             memory: memory.and_then(|memory| memory["base-memory"].as_u64()),
             long_mode,
             arguments: self.arguments.clone(),
@@ -618,18 +571,18 @@ impl Machine {
         while self.run.ended.is_none() {
             let wait = by.saturating_duration_since(Instant::now());
             match self.events.recv_timeout(wait).ok()? {
-                Event::Control(mut reply) if qmp::is_reply(&reply, id) => {
+                VmEvent::Control(mut reply) if qmp::is_reply(&reply, id) => {
                     return reply.get_mut("return").map(Value::take);
                 }
-                event => self.take(event),
+                event => self.handle(event),
             }
         }
         None
     }
 
-    /// Sends a command that writes a file, as [`Machine::request`] does, and returns the file's bytes.
+    /// Sends a command that writes a file, as [`Vm::request`] does, and returns the file's bytes.
     fn request_file(&mut self, execute: &str, mut arguments: Value) -> Option<Vec<u8>> {
-        let mut file = Nameless::new().ok()?;
+        let mut file = UnnamedFile::new().ok()?;
         arguments["filename"] = file.path().into();
         self.request(execute, arguments)?;
         file.bytes().ok()
@@ -651,7 +604,7 @@ impl Machine {
             // The whole process group: `--qemu` may name a script that starts QEMU.
             let _ = kill_process_group(self.process, Signal::KILL);
             match self.events.recv_timeout(self.limits.answer) {
-                Ok(event) => drop(self.run.take(event)),
+                Ok(event) => drop(self.run.handle(event)),
                 Err(_) => return,
             }
         }
@@ -659,12 +612,12 @@ impl Machine {
 }
 
 /// A file without a name. QEMU opens it through this process's entry in `/proc`.
-struct Nameless(File);
+struct UnnamedFile(File);
 
-impl Nameless {
+impl UnnamedFile {
     fn new() -> anyhow::Result<Self> {
         let file = rustix::fs::memfd_create("crystal-ball", MemfdFlags::CLOEXEC);
-        Ok(Self(file.context("no file in memory")?.into()))
+        Ok(Self(file.context("no file can be made in memory")?.into()))
     }
 
     /// Returns a path to the file. It is valid while this process lives.
@@ -680,7 +633,7 @@ impl Nameless {
     }
 }
 
-impl Backend for Machine {
+impl Backend for Vm {
     /// Sends the command and waits for the answer. An error is a [`Failure`], or the kernel's `error` line.
     fn send(&mut self, command: Command) -> anyhow::Result<Vec<String>> {
         self.send_line(&command.to_string())?;
@@ -689,7 +642,7 @@ impl Backend for Machine {
             Some(last) if last == format!("{OK} {command}") => Ok(answer),
             last => {
                 let last = last.unwrap_or_default();
-                Err(anyhow!("the kernel answered '{command}' with '{last}'"))
+                Err(anyhow!("'{command}': the kernel answered '{last}'"))
             }
         }
     }
@@ -699,24 +652,24 @@ impl Backend for Machine {
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
         let lines = self.send(Command::Dump(content))?;
         Dump::from_lines(&lines).map_err(|error| {
-            let why = format!("its dump is wrong in {error}");
+            let why = format!("the dump is damaged in {error}");
             self.fail(Verdict::Garbled { why })
         })
     }
 
     /// Returns QEMU's `screendump`.
     fn screen(&mut self) -> anyhow::Result<RgbImage> {
-        let mut file = Nameless::new()?;
+        let mut file = UnnamedFile::new()?;
         let reply = self.control("screendump", json!({ "filename": file.path() }))?;
         if let Some(error) = reply.get("error") {
-            bail!("QEMU takes no screendump: {error}");
+            bail!("QEMU's screendump failed: {error}");
         }
         let bytes = file.bytes().context("QEMU's screendump cannot be read")?;
-        RgbImage::from_ppm(&bytes).context("QEMU's screendump is no frame")
+        RgbImage::from_ppm(&bytes).context("QEMU's screendump is not an image")
     }
 }
 
-impl Drop for Machine {
+impl Drop for Vm {
     fn drop(&mut self) {
         self.end();
     }
@@ -724,28 +677,28 @@ impl Drop for Machine {
 
 /// The kernel left on command. It travels as an error, but it is a success.
 #[derive(Debug, PartialEq, Eq)]
-struct Left;
+struct KernelLeft;
 
-impl std::fmt::Display for Left {
+impl std::fmt::Display for KernelLeft {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str("the kernel has left")
     }
 }
 
-impl std::error::Error for Left {}
+impl std::error::Error for KernelLeft {}
 
 fn first_word(line: &str) -> &str {
     line.split(' ').next().unwrap_or("")
 }
 
-fn read_control(stream: UnixStream, send: Sender<Event>) {
+fn read_control(stream: UnixStream, send: Sender<VmEvent>) {
     thread::spawn(move || {
         for line in BufReader::new(stream).lines().map_while(Result::ok) {
             if let Ok(value) = serde_json::from_str(&line) {
-                let _ = send.send(Event::Control(value));
+                let _ = send.send(VmEvent::Control(value));
             }
         }
-        let _ = send.send(Event::ControlClosed);
+        let _ = send.send(VmEvent::ControlClosed);
     });
 }
 
@@ -753,13 +706,13 @@ fn read_control(stream: UnixStream, send: Sender<Event>) {
 ///
 /// QEMU sends each byte in a separate call, up to 100 000 a second. A thread that wakes for each byte keeps a
 /// core busy.
-const GATHERING: Duration = Duration::from_micros(250);
+const READ_INTERVAL: Duration = Duration::from_micros(250);
 
 /// Starts a thread that copies the serial line to `log` and sends its lines as events.
 ///
 /// Before the kernel's first valid line the firmware may print anything, so invalid lines are ignored. After
 /// it, every line must have its checksum.
-fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event>) {
+fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<VmEvent>) {
     thread::spawn(move || {
         let (mut lines, mut greeted) = (Lines::new(), false);
         let mut bytes = [0; 4096];
@@ -778,9 +731,9 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event
                 });
                 greeted |= text.is_ok();
                 let event = match text {
-                    Ok(text) => Event::Line(text.to_string()),
+                    Ok(text) => VmEvent::Line(text.to_string()),
                     Err(_) if !greeted => continue,
-                    Err(why) => Event::Garbled(why),
+                    Err(why) => VmEvent::Garbled(why),
                 };
                 // The machine was dropped. Without this return, a flood of lines would keep the thread busy
                 // for ever.
@@ -788,8 +741,8 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<Event
                     return;
                 }
             }
-            thread::sleep(GATHERING);
+            thread::sleep(READ_INTERVAL);
         }
-        let _ = send.send(Event::SerialClosed);
+        let _ = send.send(VmEvent::SerialClosed);
     });
 }

@@ -1,7 +1,7 @@
 //! The state of a run, derived from its events alone, and the verdict on it.
 //!
-//! Nothing here waits or talks to QEMU: [`Run::take`] returns the action that the caller must carry out. A
-//! test can therefore judge the recorded events of any QEMU version.
+//! Nothing here waits or talks to QEMU: [`RunState::handle`] returns the action that the caller must carry
+//! out. A test can therefore judge the recorded events of any QEMU version.
 
 use std::collections::VecDeque;
 use std::process::ExitStatus;
@@ -10,13 +10,13 @@ use std::time::Instant;
 use protocol::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, HELLO, LOADED, PANIC, REFUSED};
 use serde_json::Value;
 
-use super::verdict::{Found, Verdict};
+use super::verdict::{BootDiagnosis, Verdict};
 
 /// Run states in which QEMU itself has stopped the machine and that the user does not end. QEMU's other
 /// stopped states are the user's pause, a debugger's stop, and states that pass.
 const QEMU_STOPPED: [&str; 4] = ["guest-panicked", "internal-error", "io-error", "watchdog"];
 /// QEMU's events that explain such a state. Their data is kept for the message.
-const TELLING: [&str; 4] = [
+const EXPLAINING_EVENTS: [&str; 4] = [
     "BLOCK_IO_ERROR",
     "GUEST_PANICKED",
     "MEMORY_FAILURE",
@@ -25,7 +25,7 @@ const TELLING: [&str; 4] = [
 
 /// An event of a running QEMU.
 #[derive(Debug)]
-pub enum Event {
+pub enum VmEvent {
     /// A line on the serial line with a correct checksum.
     Line(String),
     /// Invalid data on the serial line, as a description of the error.
@@ -33,7 +33,7 @@ pub enum Event {
     /// A message on the control socket.
     Control(Value),
     /// A line of QEMU's standard error, which also receives its standard output.
-    Words(String),
+    Output(String),
     /// QEMU's end.
     Ended(std::io::Result<ExitStatus>),
     /// Everything on the serial line has been read.
@@ -42,9 +42,9 @@ pub enum Event {
     ControlClosed,
 }
 
-/// The action that an event calls for.
+/// The action that the caller must carry out after an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Act {
+pub enum Reaction {
     /// Send QEMU `quit`: the machine is off, and QEMU may otherwise wait for ever.
     Quit,
     /// Send QEMU `query-status` to find out why the machine has stopped.
@@ -55,7 +55,7 @@ pub enum Act {
 
 /// The state of a run.
 #[derive(Debug, Default)]
-pub struct Run {
+pub struct RunState {
     /// The kernel's first line has come.
     pub hello: bool,
     /// The kernel's line about the model file in its ramdisk: accepted or refused.
@@ -73,7 +73,7 @@ pub struct Run {
     /// QEMU's unread replies.
     pub replies: VecDeque<Value>,
     /// QEMU's output, and explanations from its events.
-    pub words: Vec<String>,
+    pub output: Vec<String>,
     /// QEMU's exit status, once it has ended.
     pub ended: Option<ExitStatus>,
     /// QEMU's reason for turning the machine off. The first reason stays, because `quit` adds another reason
@@ -89,50 +89,52 @@ pub struct Run {
     certain: Option<Verdict>,
 }
 
-impl Run {
+impl RunState {
     /// Updates the state with an event, and returns the action that follows from it.
-    pub fn take(&mut self, event: Event) -> Option<Act> {
+    pub fn handle(&mut self, event: VmEvent) -> Option<Reaction> {
         match event {
-            Event::Line(line) => return self.take_line(line),
-            Event::Control(message) => return self.take_control(message),
-            Event::Garbled(why) => self.decide(Verdict::Garbled { why }),
-            Event::Words(line) => self.words.push(line),
-            Event::Ended(Ok(status)) => self.ended = Some(status),
-            Event::Ended(Err(error)) => self.words.push(error.to_string()),
-            Event::SerialClosed => self.serial_closed = true,
-            Event::ControlClosed => self.control_closed = true,
+            VmEvent::Line(line) => return self.handle_line(line),
+            VmEvent::Control(message) => return self.handle_control(message),
+            VmEvent::Garbled(why) => self.decide(Verdict::Garbled { why }),
+            VmEvent::Output(line) => self.output.push(line),
+            VmEvent::Ended(Ok(status)) => self.ended = Some(status),
+            VmEvent::Ended(Err(error)) => self.output.push(error.to_string()),
+            VmEvent::SerialClosed => self.serial_closed = true,
+            VmEvent::ControlClosed => self.control_closed = true,
         }
         None
     }
 
-    fn take_line(&mut self, line: String) -> Option<Act> {
+    fn handle_line(&mut self, line: String) -> Option<Reaction> {
         let word = line.split(' ').next().unwrap_or("");
         if word == HELLO {
-            let spoken = format!("protocol {}", protocol::PROTOCOL);
+            let supported = format!("protocol {}", protocol::PROTOCOL);
             if self.hello {
                 self.decide(Verdict::TripleFault { booted: true });
-            } else if !line.ends_with(&spoken) {
-                let why = format!("the kernel says '{line}'; this program speaks {spoken}");
+            } else if !line.ends_with(&supported) {
+                let why = format!(
+                    "the kernel's first line is '{line}', but this program supports {supported}"
+                );
                 self.decide(Verdict::Garbled { why });
             }
             self.hello = true;
         } else if [LOADED, REFUSED].contains(&word) {
             self.model_file = Some(line);
         } else if [PANIC, EXCEPTION, ADAPTER].contains(&word) || !self.report.is_empty() {
-            let whole = line == END_OF_REPORT;
+            let is_complete = line == END_OF_REPORT;
             self.report.push(line);
-            return whole.then_some(Act::Acknowledge);
+            return is_complete.then_some(Reaction::Acknowledge);
         } else {
             self.lines.push_back(line);
         }
         None
     }
 
-    fn take_control(&mut self, message: Value) -> Option<Act> {
+    fn handle_control(&mut self, message: Value) -> Option<Reaction> {
         let Some(event) = message.get("event").and_then(Value::as_str) else {
             // QMP's greeting and its events have no `id`; only replies have one.
             if message.get("id").is_some() {
-                self.take_status(&message["return"]["status"]);
+                self.handle_status(&message["return"]["status"]);
                 self.replies.push_back(message);
             }
             return None;
@@ -149,20 +151,20 @@ impl Run {
                 // some reasons QEMU ends despite the option, as 7.2 does for `isa-debug-exit`. From version
                 // 10 on, `quit` yields the exit code that the kernel wrote to that device. A machine that has
                 // reset itself gets no `quit`: it is judged while it stands still.
-                return (reason != "guest-reset").then_some(Act::Quit);
+                return (reason != "guest-reset").then_some(Reaction::Quit);
             }
             // The user asked for a power-down in the window's menu or at the monitor. The kernel does not
             // notice it.
-            "POWERDOWN" => return Some(Act::Quit),
+            "POWERDOWN" => return Some(Reaction::Quit),
             "RESET" => self.reset = true,
             // A machine that is off sends `STOP` too, but no user has paused it.
             "STOP" if self.shutdown.is_none() => {
                 self.paused.get_or_insert_with(Instant::now);
-                return Some(Act::AskStatus);
+                return Some(Reaction::AskStatus);
             }
             "RESUME" => self.paused = None,
-            event if TELLING.contains(&event) => {
-                self.words.push(format!("({event}: {})", message["data"]));
+            event if EXPLAINING_EVENTS.contains(&event) => {
+                self.output.push(format!("({event}: {})", message["data"]));
             }
             _ => {}
         }
@@ -170,14 +172,14 @@ impl Run {
     }
 
     /// Updates the state with the machine's run state, given by QEMU's name for it.
-    fn take_status(&mut self, status: &Value) {
+    fn handle_status(&mut self, status: &Value) {
         match status.as_str() {
             Some("running") => self.paused = None,
             Some(status) if QEMU_STOPPED.contains(&status) => {
-                let mut words = self.words.clone();
-                words.push(format!("(QEMU stopped the machine: '{status}')"));
+                let mut output = self.output.clone();
+                output.push(format!("(QEMU stopped the machine: '{status}')"));
                 self.decide(Verdict::Qemu {
-                    words,
+                    output,
                     status: None,
                 });
             }
@@ -195,7 +197,7 @@ impl Run {
         self.reset || self.shutdown.as_deref() == Some("guest-reset")
     }
 
-    /// Returns whether the verdict is certain. QEMU's end alone is not enough: the last words of the kernel
+    /// Returns whether the verdict is certain. QEMU's end alone is not enough: the last lines of the kernel
     /// and of QEMU may still be unread.
     pub fn is_decided(&self) -> bool {
         self.certain.is_some()
@@ -207,8 +209,9 @@ impl Run {
     /// successfully before the machine was started. QEMU 7.2 ends `-d help` with exit code 1.
     pub fn printed(&self) -> Option<String> {
         let code = self.ended.and_then(|status| status.code());
-        let well = code == Some(0) || (code == Some(1) && self.asked_for_list);
-        (well && !self.started && !self.words.is_empty()).then(|| self.words.join("\n") + "\n")
+        let succeeded = code == Some(0) || (code == Some(1) && self.asked_for_list);
+        (succeeded && !self.started && !self.output.is_empty())
+            .then(|| self.output.join("\n") + "\n")
     }
 
     /// Returns `Ok` if the kernel left on command, and otherwise the verdict.
@@ -227,7 +230,7 @@ impl Run {
             (_, Some("guest-reset")) if self.hello => Verdict::TripleFault { booted: false },
             (_, Some("guest-reset")) => Verdict::BootLoader {
                 reset: true,
-                found: Found::default(),
+                diagnosis: BootDiagnosis::default(),
             },
             // SDL's window gives the reason `host-ui` when it is closed. GTK's window gives `host-qmp-quit`.
             // So does this program's `quit`, but only after the user's request or an earlier reason, which
@@ -236,7 +239,7 @@ impl Run {
                 Verdict::User
             }
             _ => Verdict::Qemu {
-                words: std::mem::take(&mut self.words),
+                output: std::mem::take(&mut self.output),
                 status: self.ended,
             },
         })
@@ -277,30 +280,30 @@ mod tests {
     const STOP: &str = r#"qmp {"event": "STOP"}"#;
     const RESUME: &str = r#"qmp {"event": "RESUME"}"#;
 
-    /// Returns a run that has received `events`, and the actions that followed.
-    fn played(events: &[&str]) -> (Run, Vec<Act>) {
-        let (mut run, mut acts) = (Run::default(), Vec::new());
+    /// Returns a run that has received `events`, and its reactions.
+    fn played(events: &[&str]) -> (RunState, Vec<Reaction>) {
+        let (mut run, mut reactions) = (RunState::default(), Vec::new());
         run.started = true;
         for event in events {
             let (from, rest) = event.split_once(' ').unwrap();
             let event = match from {
-                "qmp" => Event::Control(serde_json::from_str(rest).unwrap()),
-                "com1" if *event == HELLO => Event::Line(format!("{rest}{}", protocol::PROTOCOL)),
-                "com1" => Event::Line(rest.into()),
-                "words" => Event::Words(rest.into()),
+                "qmp" => VmEvent::Control(serde_json::from_str(rest).unwrap()),
+                "com1" if *event == HELLO => VmEvent::Line(format!("{rest}{}", protocol::PROTOCOL)),
+                "com1" => VmEvent::Line(rest.into()),
+                "output" => VmEvent::Output(rest.into()),
                 "end" => {
-                    run.take(Event::SerialClosed);
-                    run.take(Event::ControlClosed);
+                    run.handle(VmEvent::SerialClosed);
+                    run.handle(VmEvent::ControlClosed);
                     let number: i32 = rest.parse().unwrap();
                     // The wait status: a negative number stands for a signal.
                     let status = if number < 0 { -number } else { number << 8 };
-                    Event::Ended(Ok(ExitStatus::from_raw(status)))
+                    VmEvent::Ended(Ok(ExitStatus::from_raw(status)))
                 }
                 other => panic!("{other}"),
             };
-            acts.extend(run.take(event));
+            reactions.extend(run.handle(event));
         }
-        (run, acts)
+        (run, reactions)
     }
 
     fn panic_report() -> [&'static str; 3] {
@@ -312,12 +315,12 @@ mod tests {
     }
 
     #[test]
-    fn leaving_ends_well_on_every_version() {
+    fn a_kernel_that_leaves_on_command_succeeds_on_every_version_of_qemu() {
         let old = [HELLO, "com1 ok leave", "end 33"];
         let new = [HELLO, "com1 ok leave", GUEST_SHUTDOWN, STOP, QUIT, "end 33"];
-        for (events, asked) in [(&old[..], &[][..]), (&new, &[Act::Quit])] {
-            let (mut run, acts) = played(events);
-            assert_eq!(acts, asked);
+        for (events, expected) in [(&old[..], &[][..]), (&new, &[Reaction::Quit])] {
+            let (mut run, reactions) = played(events);
+            assert_eq!(reactions, expected);
             assert!(run.is_decided());
             run.leaving = true;
             assert_eq!(run.verdict(), Ok(()));
@@ -328,7 +331,7 @@ mod tests {
     }
 
     #[test]
-    fn a_report_is_judged_on_every_version() {
+    fn a_kernels_report_gives_its_verdict_on_every_version_of_qemu() {
         let kinds = [
             ("panic", 35, 10),
             ("exception", 37, 11),
@@ -337,15 +340,15 @@ mod tests {
         for (word, code, ours) in kinds {
             let first = format!("com1 {word} somewhere");
             let end = format!("end {code}");
-            let said = [HELLO, &first, "com1 end of report"];
-            let old = [&said[..], &[&end]].concat();
-            let new = [&said[..], &[GUEST_SHUTDOWN, STOP, QUIT, &end]].concat();
+            let received = [HELLO, &first, "com1 end of report"];
+            let old = [&received[..], &[&end]].concat();
+            let new = [&received[..], &[GUEST_SHUTDOWN, STOP, QUIT, &end]].concat();
             // QEMU had to be killed: the report decides.
-            let killed = [&said[..], &[GUEST_SHUTDOWN, STOP, "end -9"]].concat();
+            let killed = [&received[..], &[GUEST_SHUTDOWN, STOP, "end -9"]].concat();
             for (events, quits) in [(old, 0), (new, 1), (killed, 1)] {
-                let (mut run, acts) = played(&events);
-                assert_eq!(acts[0], Act::Acknowledge, "{events:?}");
-                assert_eq!(acts.len(), 1 + quits, "{events:?}");
+                let (mut run, reactions) = played(&events);
+                assert_eq!(reactions[0], Reaction::Acknowledge, "{events:?}");
+                assert_eq!(reactions.len(), 1 + quits, "{events:?}");
                 assert!(run.is_decided());
                 assert_eq!(run.verdict().unwrap_err().exit_code(), ours, "{events:?}");
             }
@@ -353,16 +356,16 @@ mod tests {
     }
 
     #[test]
-    fn a_report_cut_short_by_qemus_death_is_qemus() {
+    fn a_report_that_qemus_end_cuts_short_is_a_failure_of_qemu() {
         let [first, second, _] = panic_report();
         let (mut run, _) = played(&[HELLO, first, second, "end -9"]);
         assert_eq!(run.verdict().unwrap_err().exit_code(), 15);
     }
 
     #[test]
-    fn a_reset_is_judged_while_the_machine_stands() {
-        let (mut run, acts) = played(&[HELLO, GUEST_RESET, STOP]);
-        assert_eq!(acts, []);
+    fn a_reset_gives_its_verdict_while_the_machine_is_stopped() {
+        let (mut run, reactions) = played(&[HELLO, GUEST_RESET, STOP]);
+        assert_eq!(reactions, []);
         assert!(run.is_decided() && run.paused.is_none());
         let fault = Verdict::TripleFault { booted: false };
         assert_eq!(run.verdict(), Err(fault));
@@ -375,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_user_does_at_the_window_is_the_users() {
+    fn an_end_through_the_window_is_ended_by_the_user() {
         for (events, quits) in [
             (&[HELLO, QUIT, "end 0"][..], true),
             (&[HELLO, SIGNAL, "end 0"], true),
@@ -386,8 +389,8 @@ mod tests {
             // The window was closed during a pause.
             (&[HELLO, STOP, QUIT, "end 0"], true),
         ] {
-            let (mut run, acts) = played(events);
-            assert_eq!(acts.contains(&Act::Quit), quits, "{events:?}");
+            let (mut run, reactions) = played(events);
+            assert_eq!(reactions.contains(&Reaction::Quit), quits, "{events:?}");
             assert!(run.is_decided() && run.paused.is_none());
             assert_eq!(run.verdict(), Err(Verdict::User), "{events:?}");
         }
@@ -395,23 +398,23 @@ mod tests {
 
     /// QEMU's last message may be read after its end is known, and it contains the reason of a shutdown.
     #[test]
-    fn the_last_message_is_waited_for() {
+    fn the_verdict_waits_for_qemus_last_message() {
         let (mut run, _) = played(&[HELLO, POWERDOWN]);
-        run.take(Event::Ended(Ok(ExitStatus::from_raw(0))));
-        run.take(Event::SerialClosed);
+        run.handle(VmEvent::Ended(Ok(ExitStatus::from_raw(0))));
+        run.handle(VmEvent::SerialClosed);
         assert!(!run.is_decided());
         let (_, quit) = QUIT.split_once(' ').unwrap();
-        run.take(Event::Control(serde_json::from_str(quit).unwrap()));
-        run.take(Event::ControlClosed);
+        run.handle(VmEvent::Control(serde_json::from_str(quit).unwrap()));
+        run.handle(VmEvent::ControlClosed);
         assert!(run.is_decided());
         assert_eq!(run.verdict(), Err(Verdict::User));
     }
 
     #[test]
-    fn only_a_user_pauses() {
+    fn only_a_users_stop_is_a_pause() {
         let status = |name: &str| format!(r#"qmp {{"return": {{"status": "{name}"}}, "id": 7}}"#);
-        let (run, acts) = played(&[HELLO, STOP]);
-        assert_eq!(acts, [Act::AskStatus]);
+        let (run, reactions) = played(&[HELLO, STOP]);
+        assert_eq!(reactions, [Reaction::AskStatus]);
         assert!(run.paused.is_some());
         for name in ["paused", "debug", "save-vm"] {
             let (run, _) = played(&[HELLO, STOP, &status(name)]);
@@ -423,32 +426,32 @@ mod tests {
         assert!(run.paused.is_none());
         // A machine that is off is not paused, whichever of the two events comes first.
         for events in [[HELLO, GUEST_SHUTDOWN, STOP], [HELLO, STOP, GUEST_SHUTDOWN]] {
-            let (run, acts) = played(&events);
+            let (run, reactions) = played(&events);
             assert!(run.paused.is_none() && run.shutdown.is_some(), "{events:?}");
-            assert_eq!(acts.last(), Some(&Act::Quit), "{events:?}");
+            assert_eq!(reactions.last(), Some(&Reaction::Quit), "{events:?}");
         }
         let error = r#"qmp {"event": "BLOCK_IO_ERROR", "data": {"action": "stop"}}"#;
         let (mut run, _) = played(&[HELLO, error, STOP, &status("io-error")]);
         assert!(run.is_decided());
-        let said = run.verdict().unwrap_err();
-        assert_eq!(said.exit_code(), 15);
-        let said = said.to_string();
-        assert!(said.contains("BLOCK_IO_ERROR"), "{said}");
-        assert!(said.contains("'io-error'"), "{said}");
+        let verdict = run.verdict().unwrap_err();
+        assert_eq!(verdict.exit_code(), 15);
+        let message = verdict.to_string();
+        assert!(message.contains("BLOCK_IO_ERROR"), "{message}");
+        assert!(message.contains("'io-error'"), "{message}");
     }
 
     #[test]
-    fn a_list_that_was_asked_for_is_printed_and_no_failure() {
-        let (mut run, _) = played(&["words Supported machines are:", "words none", "end 0"]);
+    fn a_requested_list_is_printed_and_is_not_a_failure() {
+        let (mut run, _) = played(&["output Supported machines are:", "output none", "end 0"]);
         assert_eq!(run.printed(), None, "the machine had been started");
         run.started = false;
         assert_eq!(run.printed().unwrap(), "Supported machines are:\nnone\n");
-        for events in [&["words no such machine", "end 1"][..], &["end 0"]] {
+        for events in [&["output no such machine", "end 1"][..], &["end 0"]] {
             let (mut run, _) = played(events);
             run.started = false;
             assert_eq!(run.printed(), None, "{events:?}");
         }
-        let (mut run, _) = played(&["words Log items", "end 1"]);
+        let (mut run, _) = played(&["output Log items", "end 1"]);
         (run.started, run.asked_for_list) = (false, true);
         assert_eq!(run.printed().unwrap(), "Log items\n");
     }

@@ -13,14 +13,14 @@ use frames::rgb::RgbImage;
 
 /// MiB of memory with which the image boots on every QEMU version tried: 7.2 needs 25, versions from 10 on up
 /// to 32.
-const ENOUGH_MIB: u64 = 32;
+const MIN_MIB: u64 = 32;
 /// QEMU options that may replace the image by other firmware or another system.
-const OTHER_FIRMWARE: [&str; 6] = ["bios", "boot", "kernel", "L", "option-rom", "pflash"];
+const FIRMWARE_OPTIONS: [&str; 6] = ["bios", "boot", "kernel", "L", "option-rom", "pflash"];
 
 /// Number of failures whose evidence is kept; older evidence is removed.
-const KEPT: usize = 20;
+const MAX_FAILURES: usize = 20;
 
-/// How a run ended, unless the kernel left on command.
+/// How a run failed. A run in which the kernel left on command has no verdict.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
     /// The user closed the window, reset or powered down the machine from QEMU's menu, or ended QEMU by a
@@ -55,8 +55,8 @@ pub enum Verdict {
     BootLoader {
         /// Whether the machine reset; otherwise nothing happened at all.
         reset: bool,
-        /// QEMU's answers about the machine.
-        found: Found,
+        /// The properties of the machine that explain the end.
+        diagnosis: BootDiagnosis,
     },
     /// The serial line carried data that the kernel of this version does not send.
     Garbled {
@@ -66,7 +66,7 @@ pub enum Verdict {
     /// QEMU itself failed.
     Qemu {
         /// QEMU's output.
-        words: Vec<String>,
+        output: Vec<String>,
         /// QEMU's exit status, if it had ended.
         status: Option<ExitStatus>,
     },
@@ -100,30 +100,29 @@ impl fmt::Display for Verdict {
             }
             Self::Adapter { report } => write!(
                 f,
-                "the display adapter does not take Mode X{}\nQEMU 10.0 with `-machine smm=off` shows RAM \
-                 in place of video memory: leave that option out. In place of another adapter use \
-                 `--vga std`",
+                "the display adapter does not support Mode X{}\nWith `-machine smm=off`, QEMU 10.0 shows RAM in \
+                 place of video memory: leave that option out. With another adapter: use `--vga std`",
                 Indented(report)
             ),
             Self::TripleFault { booted: false } => f.write_str(
-                "the machine reset itself: a triple fault (an exception that the kernel could not even report)",
+                "the machine reset itself: a triple fault (an exception that the kernel could not report)",
             ),
             Self::TripleFault { booted: true } => f.write_str("the kernel started a second time: a reboot loop"),
             Self::Hang { waited_for } => {
-                write!(f, "the kernel hangs: {waited_for} did not come in time")
+                write!(f, "the kernel hangs: {waited_for} did not come within the time limit")
             }
-            Self::BootLoader { reset, found } => {
+            Self::BootLoader { reset, diagnosis } => {
                 let end = if *reset { "reset the machine" } else { "stopped" };
-                write!(f, "the boot loader {end} before it reached the kernel{found}")
+                write!(f, "the boot loader {end} before it reached the kernel{diagnosis}")
             }
             Self::Garbled { why } => write!(f, "the serial line is garbled: {why}"),
-            Self::Qemu { words, status } => {
-                f.write_str("QEMU itself failed")?;
+            Self::Qemu { output, status } => {
+                f.write_str("QEMU failed")?;
                 if let Some(status) = status {
                     write!(f, " ({status})")?;
                 }
-                write!(f, "{}", Indented(words))?;
-                match explain(words) {
+                write!(f, "{}", Indented(output))?;
+                match explain(output) {
                     Some(explanation) => write!(f, "\n{explanation}"),
                     None => Ok(()),
                 }
@@ -132,9 +131,9 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The properties of a machine whose boot loader did not reach the kernel.
+/// QEMU's answers about a machine whose boot loader did not reach the kernel.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Found {
+pub struct BootDiagnosis {
     /// Bytes of memory, if QEMU reported them.
     pub memory: Option<u64>,
     /// Whether the CPU has long mode, if QEMU reported it.
@@ -145,36 +144,36 @@ pub struct Found {
     pub screen: Vec<String>,
 }
 
-impl Found {
+impl BootDiagnosis {
     /// Returns the reasons why the image may not boot on this machine, each with its remedy.
     fn causes(&self) -> Vec<String> {
         let mut causes = Vec::new();
         if let Some(bytes) = self.memory
-            && bytes < ENOUGH_MIB << 20
+            && bytes < MIN_MIB << 20
         {
             causes.push(format!(
-                "memory: the machine has {} MiB; give it at least {ENOUGH_MIB} (`-m {ENOUGH_MIB}`)",
+                "memory: the machine has {} MiB; give it at least {MIN_MIB} (`-m {MIN_MIB}`)",
                 bytes >> 20
             ));
         }
         if self.long_mode == Some(false) {
             causes.push(
-                "CPU: it has no long mode, and the kernel is 64-bit code; name a 64-bit CPU \
+                "CPU: it has no long mode, but the kernel is 64-bit code; choose a 64-bit CPU \
                  (`-cpu qemu64`)"
                     .into(),
             );
         }
         if names_accelerator(&self.arguments) {
             causes.push(
-                "accelerator: the image is tried with TCG only; leave yours out to use it".into(),
+                "accelerator: the image was tested with TCG only; leave the option out to use TCG"
+                    .into(),
             );
         }
         for word in &self.arguments {
             let word = word.to_string_lossy();
-            if option(&word).is_some_and(|name| OTHER_FIRMWARE.contains(&name)) {
+            if option(&word).is_some_and(|name| FIRMWARE_OPTIONS.contains(&name)) {
                 causes.push(format!(
-                    "firmware: `{word}` may put other firmware or another system in the image's \
-                     place; leave it out"
+                    "firmware: `{word}` may boot other firmware or another system; leave it out"
                 ));
             } else if word.contains("if=pflash") || word.contains("bootindex=") {
                 causes.push(format!(
@@ -186,21 +185,21 @@ impl Found {
     }
 }
 
-impl fmt::Display for Found {
+impl fmt::Display for BootDiagnosis {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let causes = self.causes();
         write!(f, "{}", Indented(&causes))?;
         if causes.is_empty() {
             f.write_str(
-                "\n  display adapter: the boot loader needs a VGA core with VESA modes; `-vga std`, \
-                 `cirrus`, `vmware` and `virtio` have one, `-vga none`, `bochs-display`, `ramfb` and \
-                 `ati-vga` have none",
+                "\n  display adapter: the boot loader needs a VGA core with VESA modes: `-vga std`, \
+                 `cirrus`, `vmware` and `virtio` have it; `-vga none`, `bochs-display`, `ramfb` and \
+                 `ati-vga` do not",
             )?;
         }
         if self.screen.is_empty() {
             return Ok(());
         }
-        write!(f, "\n  its screen says:")?;
+        write!(f, "\n  the text on the screen:")?;
         self.screen
             .iter()
             .try_for_each(|line| write!(f, "\n    {line}"))
@@ -224,16 +223,18 @@ pub fn text_lines(memory: &[u8]) -> Vec<String> {
 }
 
 /// Returns an explanation of QEMU's output, if the output is a known error.
-fn explain(words: &[String]) -> Option<&'static str> {
-    let said = |text: &str| words.iter().any(|line| line.contains(text));
-    if said("Failed to get") && said("lock") {
-        Some("Another program holds the disk image; end it, or boot a copy (`image --out FILE`).")
-    } else if said("initialization failed") || said("cannot open display") {
-        Some("The window could not be opened. `--headless` runs without one.")
-    } else if said("No space left") {
-        Some("The disk for temporary files is full; TMPDIR can name another folder.")
-    } else if words.is_empty() {
-        Some("It said nothing: it was killed, or it crashed.")
+fn explain(output: &[String]) -> Option<&'static str> {
+    let has = |text: &str| output.iter().any(|line| line.contains(text));
+    if has("Failed to get") && has("lock") {
+        Some(
+            "Another program has locked the disk image; end that program, or boot a copy (`image --out FILE`).",
+        )
+    } else if has("initialization failed") || has("cannot open display") {
+        Some("The window cannot be opened; use `--headless` to run without a window.")
+    } else if has("No space left") {
+        Some("The disk for temporary files is full; set TMPDIR to another folder.")
+    } else if output.is_empty() {
+        Some("QEMU printed nothing: it was killed, or it crashed.")
     } else {
         None
     }
@@ -314,11 +315,11 @@ impl Failure {
 /// disk.
 fn forget_oldest(failures: &Path) {
     let entries = read_dir(failures).into_iter().flatten();
-    let mut kept: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    let mut folders: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
     // The folders' names begin with the time.
-    kept.sort();
-    let spare = kept.len().saturating_sub(KEPT - 1);
-    for folder in &kept[..spare] {
+    folders.sort();
+    let spare = folders.len().saturating_sub(MAX_FAILURES - 1);
+    for folder in &folders[..spare] {
         // Another run may be removing the same folder.
         let _ = std::fs::remove_dir_all(folder);
     }
@@ -332,7 +333,7 @@ impl fmt::Display for Failure {
                 let kept = ["command.txt", "serial.log", "screen.png"].into_iter();
                 let kept = kept.filter(|name| folder.join(name).exists());
                 let kept: Vec<_> = kept.collect();
-                write!(f, "\nkept in {}: {}", folder.display(), kept.join(", "))
+                write!(f, "\nevidence in {}: {}", folder.display(), kept.join(", "))
             }
             None => Ok(()),
         }
@@ -345,40 +346,40 @@ impl std::error::Error for Failure {}
 mod tests {
     use super::*;
 
-    fn said(found: Found) -> String {
+    fn message(diagnosis: BootDiagnosis) -> String {
         let reset = false;
-        Verdict::BootLoader { reset, found }.to_string()
+        Verdict::BootLoader { reset, diagnosis }.to_string()
     }
 
     #[test]
-    fn a_stop_in_the_boot_loader_names_what_was_found() {
-        let whole = Found {
+    fn the_message_about_a_stopped_boot_loader_names_the_cause() {
+        let sound = BootDiagnosis {
             memory: Some(128 << 20),
             long_mode: Some(true),
-            ..Found::default()
+            ..BootDiagnosis::default()
         };
-        let adapter = said(whole.clone());
+        let adapter = message(sound.clone());
         assert!(adapter.contains("display adapter"), "{adapter}");
-        let with = |words: &[&str]| Found {
+        let with = |words: &[&str]| BootDiagnosis {
             arguments: words.iter().map(OsString::from).collect(),
-            ..whole.clone()
+            ..sound.clone()
         };
-        for (found, words) in [
+        for (diagnosis, text) in [
             (
-                Found {
+                BootDiagnosis {
                     memory: Some(16 << 20),
-                    ..whole.clone()
+                    ..sound.clone()
                 },
                 "has 16 MiB; give it at least 32",
             ),
             (
-                Found {
+                BootDiagnosis {
                     long_mode: Some(false),
-                    ..whole.clone()
+                    ..sound.clone()
                 },
                 "no long mode",
             ),
-            (with(&["-accel", "kvm"]), "leave yours out"),
+            (with(&["-accel", "kvm"]), "leave the option out"),
             (with(&["-bios", "other.bin"]), "`-bios`"),
             (with(&["--kernel", "vmlinuz"]), "`--kernel`"),
             (with(&["-drive", "if=pflash,file=x"]), "`if=pflash,file=x`"),
@@ -387,28 +388,28 @@ mod tests {
                 "boot before the image",
             ),
         ] {
-            let said = said(found);
-            assert!(said.contains(words), "{said}");
-            assert!(!said.contains("display adapter"), "{said}");
+            let message = message(diagnosis);
+            assert!(message.contains(text), "{message}");
+            assert!(!message.contains("display adapter"), "{message}");
         }
-        assert!(said(with(&["-m", "64"])).contains("display adapter"));
+        assert!(message(with(&["-m", "64"])).contains("display adapter"));
     }
 
     #[test]
-    fn text_memory_is_read_as_lines_or_not_at_all() {
+    fn text_memory_gives_lines_only_if_every_character_is_printable() {
         let mut memory = [b' ', 7].repeat(80 * 25);
         for (i, character) in b"No bootable device.".iter().enumerate() {
             memory[2 * (160 + i)] = *character;
         }
         assert_eq!(text_lines(&memory), ["No bootable device."]);
-        let found = Found {
+        let diagnosis = BootDiagnosis {
             screen: text_lines(&memory),
-            ..Found::default()
+            ..BootDiagnosis::default()
         };
-        let said = said(found);
+        let message = message(diagnosis);
         assert!(
-            said.ends_with("its screen says:\n    No bootable device."),
-            "{said}"
+            message.ends_with("the text on the screen:\n    No bootable device."),
+            "{message}"
         );
         assert_eq!(text_lines(&[0; 4000]), [""; 0]);
         memory[0] = 0xFF;

@@ -11,13 +11,13 @@ use std::time::{Duration, Instant};
 use rustix::process::Pid;
 
 /// Checks for idleness per limit. The interval between two checks must be long enough to measure.
-const LOOKS: u32 = 2;
+const CHECKS_PER_LIMIT: u32 = 2;
 /// QEMU is idle if it uses or waits for less than this share of one processor. A stopped machine used 1.3 %
 /// (its timers). Processor time alone does not suffice: beside thirty busy processes on two cores a booting
 /// machine used less than 4 % for 10 s, because its threads wait for each other at every sector.
 const IDLE_PERCENT: u32 = 4;
 /// Ceiling of every wait: this many limits of wall time.
-const AT_MOST: u32 = 15;
+const CEILING: u32 = 15;
 
 /// A wait for one thing, with its limit.
 #[derive(Debug)]
@@ -27,7 +27,7 @@ pub struct Watchdog {
     began: Instant,
     used: Duration,
     /// When idleness was last checked, and the total time used or waited for until then.
-    looked: (Instant, Duration),
+    checked: (Instant, Duration),
 }
 
 impl Watchdog {
@@ -40,7 +40,7 @@ impl Watchdog {
             limit,
             began: now,
             used,
-            looked: (now, used + starved_time(process)),
+            checked: (now, used + starved_time(process)),
         }
     }
 
@@ -51,7 +51,7 @@ impl Watchdog {
 
     /// Returns whether the wall time has reached the ceiling, whatever QEMU does meanwhile.
     pub fn is_past_ceiling(&self) -> bool {
-        self.began.elapsed() >= self.limit * AT_MOST
+        self.began.elapsed() >= self.limit * CEILING
     }
 
     /// Returns whether the wait is over.
@@ -59,12 +59,12 @@ impl Watchdog {
         // For a process that has just ended this is zero, less than before: hence the saturating
         // subtractions.
         let (now, used) = (Instant::now(), processor_time(self.process));
-        let (since, before) = self.looked;
+        let (since, before) = self.checked;
         let mut idle = false;
-        if now - since >= self.limit / LOOKS {
+        if now - since >= self.limit / CHECKS_PER_LIMIT {
             let wanted = used + starved_time(self.process);
             idle = wanted.saturating_sub(before) * 100 < (now - since) * IDLE_PERCENT;
-            self.looked = (now, wanted);
+            self.checked = (now, wanted);
         }
         let waited = now - self.began;
         used.saturating_sub(self.used) >= self.limit
@@ -76,9 +76,9 @@ impl Watchdog {
 /// Returns the processor time that a process has used. It is zero for a process that has ended, and on any
 /// system but Linux, which alone reports it in this way: then wall time decides.
 fn processor_time(process: Pid) -> Duration {
-    let told = std::fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero()));
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero()));
     // The second field is the program's name in parentheses, and the name may contain any character.
-    let fields = told.as_deref().ok().and_then(|stat| stat.rsplit_once(')'));
+    let fields = stat.as_deref().ok().and_then(|stat| stat.rsplit_once(')'));
     let mut fields = fields
         .map_or("", |(_, fields)| fields)
         .split_whitespace()
@@ -101,45 +101,53 @@ pub fn starved_time(process: Pid) -> Duration {
 
 #[cfg(test)]
 mod tests {
+    use std::process::{Child, Command};
+
     use super::*;
 
-    /// Two busy threads for each processor: all of them have to wait.
-    #[test]
-    fn a_starved_process_is_seen_to_wait() {
-        let own = rustix::process::getpid();
-        let before = starved_time(own);
-        let threads = 2 * std::thread::available_parallelism().unwrap().get();
-        let by = Instant::now() + Duration::from_millis(500);
-        std::thread::scope(|scope| {
-            let busy: Vec<_> = (0..threads)
-                .map(|_| {
-                    scope.spawn(|| {
-                        while Instant::now() < by {
-                            std::hint::spin_loop();
-                        }
-                    })
-                })
-                .collect();
-            // Only while the threads live: a thread that has ended is not counted.
-            while busy.iter().all(|thread| !thread.is_finished()) {
-                if starved_time(own) - before > Duration::from_millis(50) {
-                    return;
-                }
-                std::thread::sleep(Duration::from_millis(5));
+    /// Processes that are killed when the test ends, also if it fails.
+    struct BusyProcesses(Vec<Child>);
+
+    impl Drop for BusyProcesses {
+        fn drop(&mut self) {
+            for child in &mut self.0 {
+                let _ = child.kill();
+                let _ = child.wait();
             }
-            panic!("nothing waited");
-        });
+        }
+    }
+
+    /// Two busy processes for each processor: all of them have to wait. The threads of this process would
+    /// not do: the harness ends threads meanwhile, and a thread that has ended is no longer counted.
+    #[test]
+    fn a_process_without_a_processor_counts_as_starved() {
+        let count = 2 * std::thread::available_parallelism().unwrap().get();
+        let busy = || {
+            let mut shell = Command::new("sh");
+            shell.args(["-c", "while :; do :; done"]).spawn().unwrap()
+        };
+        let busy = BusyProcesses((0..count).map(|_| busy()).collect());
+        let begun = Instant::now();
+        let is_starved =
+            |child: &Child| starved_time(Pid::from_child(child)) > Duration::from_millis(50);
+        while !busy.0.iter().any(is_starved) {
+            assert!(
+                begun.elapsed() < Duration::from_secs(20),
+                "no process waited for a processor"
+            );
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     #[test]
-    fn a_process_that_works_uses_time() {
-        let own = rustix::process::getpid();
-        let before = processor_time(own);
+    fn a_busy_process_uses_processor_time() {
+        let this = rustix::process::getpid();
+        let before = processor_time(this);
         let begun = Instant::now();
         while begun.elapsed() < Duration::from_millis(300) {
             std::hint::spin_loop();
         }
-        assert!(processor_time(own) > before);
+        assert!(processor_time(this) > before);
         assert_eq!(
             processor_time(Pid::from_raw(i32::MAX).unwrap()),
             Duration::ZERO
@@ -147,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn work_uses_watchdog_up() {
+    fn a_busy_process_reaches_its_limit() {
         let mut watchdog = Watchdog::new(rustix::process::getpid(), Duration::from_millis(200));
         assert!(!watchdog.is_over());
         let begun = Instant::now();
@@ -160,8 +168,8 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_ended_meanwhile_is_waited_for_by_the_clock() {
-        let mut child = std::process::Command::new("sh")
+    fn the_wait_for_an_ended_process_lasts_its_limit_of_wall_time() {
+        let mut child = Command::new("sh")
             .args([
                 "-c",
                 "i=0; while [ $i -lt 100000 ]; do i=$((i + 1)); done; read line",

@@ -15,11 +15,11 @@ use std::process::Command;
 use anyhow::{Context, anyhow, bail};
 use tempfile::TempDir;
 
-use super::cache::{self, Locked, is_full};
+use super::cache::{self, LockedCache, is_full};
 use super::offline::offline;
 use super::sha256::sha256;
 use system::{Interrupted, child};
-use system::{Step, bytes};
+use system::{Progress, bytes};
 
 /// The file that lists a folder's packages, in apt-get's format. It is written after all packages have
 /// arrived.
@@ -45,15 +45,15 @@ Acquire::IndexTargets::deb-src::Sources::DefaultEnabled "false";
 
 /// A request for packages.
 #[derive(Debug, Clone, Copy)]
-pub struct Wanted<'a> {
+pub struct Request<'a> {
     /// The name of the software in messages, such as `Rust 1.96.0`.
     pub what: &'a str,
     /// Packages to fetch without their dependencies.
-    pub alone: &'a [&'a str],
+    pub without_dependencies: &'a [&'a str],
     /// Packages to fetch with every dependency that this system does not have in the same version.
-    pub whole: &'a [&'a str],
+    pub with_dependencies: &'a [&'a str],
     /// Prefixes of package names. Packages with such a name are fetched even if the system has them.
-    pub own: &'a [&'a str],
+    pub always: &'a [&'a str],
     /// Packages to leave out even if the system has another version.
     pub never: &'a [&'a str],
     /// The suite of Debian to fetch from, such as `bookworm-backports`, or `None` for the system's suites.
@@ -75,9 +75,9 @@ pub struct Package {
 impl Package {
     /// Parses `'URI' FILE BYTES SHA256:HASH`.
     fn parse(line: &str) -> Option<Self> {
-        let mut words = line.strip_prefix('\'')?.split_once("' ")?.1.split(' ');
-        let (file, bytes) = (words.next()?.to_owned(), words.next()?.parse().ok()?);
-        let sha256 = words.next()?.strip_prefix("SHA256:")?.to_owned();
+        let mut fields = line.strip_prefix('\'')?.split_once("' ")?.1.split(' ');
+        let (file, bytes) = (fields.next()?.to_owned(), fields.next()?.parse().ok()?);
+        let sha256 = fields.next()?.strip_prefix("SHA256:")?.to_owned();
         Some(Self {
             file,
             bytes,
@@ -132,8 +132,8 @@ pub fn is_here() -> bool {
 /// Returns the packages that an earlier [`fetch`] put into `folder`, if all of them exist and are unchanged.
 pub fn kept(folder: &Path) -> Option<Vec<Package>> {
     let list = Package::parse_all(&fs::read_to_string(folder.join(LIST)).ok()?);
-    let whole = !list.is_empty() && missing(&list, folder).is_empty();
-    whole.then_some(list)
+    let complete = !list.is_empty() && missing(&list, folder).is_empty();
+    complete.then_some(list)
 }
 
 /// Fetches packages into `folder`, by the system's package lists, or by private lists if the system's are
@@ -141,27 +141,31 @@ pub fn kept(folder: &Path) -> Option<Vec<Package>> {
 ///
 /// # Errors
 /// If cargo is offline, this is no Debian system, the archive lacks a package, or a download is incomplete.
-pub fn fetch(cache: &Locked, wanted: &Wanted, folder: &Path) -> anyhow::Result<Vec<Package>> {
+pub fn fetch(
+    cache: &LockedCache,
+    request: &Request,
+    folder: &Path,
+) -> anyhow::Result<Vec<Package>> {
     if let Some(setting) = offline() {
         bail!("cargo is offline ({setting}), so nothing is downloaded");
     }
     if !is_here() {
-        bail!("this is no Debian system (no apt-get and dpkg)");
+        bail!("this is not a Debian system: apt-get, dpkg or dpkg-query is missing");
     }
     let get = |apt: &Apt| {
-        let list = apt.list(cache, wanted)?;
-        download(cache, apt, wanted, list, folder)
+        let list = apt.list(cache, request)?;
+        download(cache, apt, request, list, folder)
     };
     // The system's lists know only the system's suites.
-    if wanted.suite.is_none() {
+    if request.suite.is_none() {
         match get(&Apt::of_system(cache)?) {
             Err(error) if !error.is::<Interrupted>() && !is_full(&error) => {}
             done => return done,
         }
     }
-    let apt = Apt::with_lists(cache, wanted.suite)?;
-    let step = Step::new(
-        "asking Debian's archive for its package lists, which are kept apart",
+    let apt = Apt::with_lists(cache, request.suite)?;
+    let step = Progress::new(
+        "downloading the lists of Debian's packages into a temporary folder",
         0,
     );
     // The exit code of `update` is that of its worst source. It matters only whether the packages are found
@@ -180,9 +184,9 @@ pub fn fetch(cache: &Locked, wanted: &Wanted, folder: &Path) -> anyhow::Result<V
 /// # Errors
 /// If dpkg is missing or fails.
 pub fn unpack(what: &str, packages: &[Package], folder: &Path, into: &Path) -> anyhow::Result<()> {
-    let dpkg = which::which("dpkg").context("this is no Debian system (no dpkg)")?;
+    let dpkg = which::which("dpkg").context("this is not a Debian system: dpkg is missing")?;
     let total = packages.iter().map(|package| package.bytes).sum();
-    let mut step = Step::new(format_args!("unpacking {what}"), total);
+    let mut step = Progress::new(format_args!("unpacking {what}"), total);
     let mut done = 0;
     for package in packages {
         let mut unpack = child::family(&dpkg);
@@ -217,7 +221,11 @@ fn merge(from: &Path, to: &Path) -> anyhow::Result<()> {
 }
 
 /// Runs a command and shows its progress.
-fn watch(command: &mut Command, mut step: Step, done: impl Fn() -> u64) -> anyhow::Result<String> {
+fn watch(
+    command: &mut Command,
+    mut step: Progress,
+    done: impl Fn() -> u64,
+) -> anyhow::Result<String> {
     child::watch(command, |event| step.on(event, &done))
 }
 
@@ -230,9 +238,9 @@ fn missing<'a>(list: &'a [Package], folder: &Path) -> Vec<&'a Package> {
 
 /// Downloads the packages that are not yet in `folder`, and writes the folder's list.
 fn download(
-    cache: &Locked,
+    cache: &LockedCache,
     apt: &Apt,
-    wanted: &Wanted,
+    request: &Request,
     list: Vec<Package>,
     folder: &Path,
 ) -> anyhow::Result<Vec<Package>> {
@@ -240,13 +248,13 @@ fn download(
     let sum = |packages: &[&Package]| packages.iter().map(|package| package.bytes).sum::<u64>();
     let total = sum(&missing);
     let all: Vec<_> = list.iter().collect();
-    cache.room(total + (wanted.room)(sum(&all)), wanted.what)?;
-    let aside = cache.aside()?;
+    cache.room(total + (request.room)(sum(&all)), request.what)?;
+    let temporary = cache.temporary_folder()?;
     if !missing.is_empty() {
-        let step = Step::new(
+        let step = Progress::new(
             format_args!(
                 "downloading {} as {} Debian packages ({}), once",
-                wanted.what,
+                request.what,
                 missing.len(),
                 bytes(total)
             ),
@@ -255,22 +263,28 @@ fn download(
         let mut get = apt.command();
         get.arg("download")
             .args(missing.iter().map(|package| package.name()))
-            .current_dir(aside.path());
-        let got = watch(&mut get, step, || cache::size(aside.path()));
+            .current_dir(temporary.path());
+        let got = watch(&mut get, step, || cache::size(temporary.path()));
         fs::create_dir_all(folder)?;
         // Even after a failure, so that complete packages need not be fetched again.
-        for package in missing.iter().filter(|package| package.is_in(aside.path())) {
-            fs::rename(aside.path().join(&package.file), folder.join(&package.file))?;
+        for package in missing
+            .iter()
+            .filter(|package| package.is_in(temporary.path()))
+        {
+            fs::rename(
+                temporary.path().join(&package.file),
+                folder.join(&package.file),
+            )?;
         }
         got?;
     }
     if let Some(package) = missing.iter().find(|package| !package.is_in(folder)) {
         let (file, hash) = (&package.file, &package.sha256);
-        bail!("{file} was cut short or changed on its way: its SHA-256 is not {hash}");
+        bail!("{file}: the download is damaged: its SHA-256 is not {hash}; try again");
     }
     let text: String = list.iter().map(|package| format!("{package}\n")).collect();
-    fs::write(aside.path().join(LIST), text)?;
-    fs::rename(aside.path().join(LIST), folder.join(LIST))?;
+    fs::write(temporary.path().join(LIST), text)?;
+    fs::rename(temporary.path().join(LIST), folder.join(LIST))?;
     Ok(list)
 }
 
@@ -278,24 +292,24 @@ fn download(
 struct Apt<'a> {
     /// The folder of the configuration and the private lists.
     folder: TempDir,
-    own_lists: bool,
+    private_lists: bool,
     suite: Option<&'a str>,
 }
 
 impl<'a> Apt<'a> {
-    fn of_system(cache: &Locked) -> anyhow::Result<Self> {
-        let folder = cache.aside()?;
+    fn of_system(cache: &LockedCache) -> anyhow::Result<Self> {
+        let folder = cache.temporary_folder()?;
         fs::write(folder.path().join("apt.conf"), CONFIGURATION)?;
         Ok(Self {
             folder,
-            own_lists: false,
+            private_lists: false,
             suite: None,
         })
     }
 
-    fn with_lists(cache: &Locked, suite: Option<&'a str>) -> anyhow::Result<Self> {
+    fn with_lists(cache: &LockedCache, suite: Option<&'a str>) -> anyhow::Result<Self> {
         let mut apt = Self {
-            own_lists: true,
+            private_lists: true,
             ..Self::of_system(cache)?
         };
         // apt-get does not create these folders.
@@ -318,7 +332,7 @@ impl<'a> Apt<'a> {
             .lines()
             .filter_map(|line| Some(line.strip_prefix('\'')?.split_once("/dists/")?.0))
             .find(|uri| uri.ends_with("/debian"))
-            .context("this system has no source that is Debian's archive")?;
+            .context("apt-get: none of the package sources is Debian's archive (a URI that ends in /debian)")?;
         let folder = self.folder.path().join("sources");
         fs::create_dir(&folder)?;
         for entry in fs::read_dir("/etc/apt/sources.list.d")
@@ -342,7 +356,7 @@ impl<'a> Apt<'a> {
             .env("LC_ALL", "C")
             .args(["-q", "-o", "APT::Sandbox::User=root", "-c"])
             .arg(folder.join("apt.conf"));
-        if !self.own_lists {
+        if !self.private_lists {
             // Run by root, apt-get would rewrite the system's index of its lists.
             for index in ["pkgcache", "srcpkgcache"] {
                 command.args(["-o", &format!("Dir::Cache::{index}=")]);
@@ -352,7 +366,7 @@ impl<'a> Apt<'a> {
             let place = format!("{option}={}", folder.join(name).display());
             command.args(["-o", &place]);
         };
-        if self.own_lists {
+        if self.private_lists {
             place("Dir::State::lists", "lists");
             place("Dir::Cache", "cache");
         }
@@ -366,32 +380,36 @@ impl<'a> Apt<'a> {
     }
 
     /// Returns the packages to fetch: the requested packages that this system lacks, and their dependencies.
-    fn list(&self, cache: &Locked, wanted: &Wanted) -> anyhow::Result<Vec<Package>> {
-        let alone = wanted.alone.iter().copied().map(str::to_owned);
+    fn list(&self, cache: &LockedCache, request: &Request) -> anyhow::Result<Vec<Package>> {
+        let alone = request
+            .without_dependencies
+            .iter()
+            .copied()
+            .map(str::to_owned);
         // Ask about the first package alone. Its name holds no version, so the archive knows it, and `check`
         // can report its version. With a name whose version the archive lacks, apt-get would list nothing.
-        if let Some(first) = wanted.alone.first() {
+        if let Some(first) = request.without_dependencies.first() {
             let first = [(*first).to_owned()];
             self.uris(cache, &first)?
                 .iter()
-                .try_for_each(wanted.check)?;
+                .try_for_each(request.check)?;
         }
-        let names: Vec<_> = alone.chain(self.needed(wanted)?).collect();
+        let names: Vec<_> = alone.chain(self.needed(request)?).collect();
         let list = self.uris(cache, &names)?;
-        list.iter().try_for_each(wanted.check)?;
+        list.iter().try_for_each(request.check)?;
         match names
             .iter()
             .find(|name| !list.iter().any(|package| package.name() == *name))
         {
-            Some(name) => bail!("apt-get does not say where to get {name}"),
+            Some(name) => bail!("apt-get: no download address for the package {name}"),
             None => Ok(list),
         }
     }
 
     /// Returns the archive's packages with these names.
-    fn uris(&self, cache: &Locked, names: &[String]) -> anyhow::Result<Vec<Package>> {
+    fn uris(&self, cache: &LockedCache, names: &[String]) -> anyhow::Result<Vec<Package>> {
         // In an empty folder, because apt-get does not list files that the current folder already has.
-        let empty = cache.aside()?;
+        let empty = cache.temporary_folder()?;
         let mut command = self.command();
         command
             .args(["--print-uris", "download"])
@@ -400,13 +418,13 @@ impl<'a> Apt<'a> {
         child::run(&mut command).map(|text| Package::parse_all(&text))
     }
 
-    /// Returns the names of `wanted.whole` and of all their dependencies, without the packages that the
-    /// system has.
-    fn needed(&self, wanted: &Wanted) -> anyhow::Result<Vec<String>> {
+    /// Returns the names of `request.with_dependencies` and of all their dependencies, without the packages
+    /// that the system has.
+    fn needed(&self, request: &Request) -> anyhow::Result<Vec<String>> {
         let mut plan = self.command();
         plan.args(["-o", "Dir::State::status=/dev/null"]);
         plan.args(["--no-install-recommends", "-y", "--print-uris", "install"]);
-        let plan = child::run(plan.args(wanted.whole))?;
+        let plan = child::run(plan.args(request.with_dependencies))?;
         let mut ask = child::command("dpkg-query");
         ask.args([
             "-W",
@@ -414,12 +432,12 @@ impl<'a> Apt<'a> {
             "${db:Status-Status} ${Package}_${Version}_${Architecture}\n",
         ]);
         let here = child::run(&mut ask)?;
-        Ok(lacking(&plan, &here, wanted))
+        Ok(lacking(&plan, &here, request))
     }
 }
 
 /// Returns the names in apt-get's plan that dpkg's list of the system, `here`, lacks.
-fn lacking(plan: &str, here: &str, wanted: &Wanted) -> Vec<String> {
+fn lacking(plan: &str, here: &str, request: &Request) -> Vec<String> {
     let here: HashSet<_> = here
         .lines()
         .filter_map(|line| line.strip_prefix("installed "))
@@ -436,10 +454,11 @@ fn lacking(plan: &str, here: &str, wanted: &Wanted) -> Vec<String> {
             let name = file.split('_').next()?;
             // apt-get escapes the colon of the version's epoch in file names.
             let package = file.strip_suffix(".deb")?.replace("%3a", ":");
-            let own = wanted.own.iter().any(|prefix| name.starts_with(prefix));
-            let lacks = own || !here.contains(package.as_str());
-            let again = wanted.alone.contains(&name) || wanted.never.contains(&name);
-            (lacks && !again).then(|| name.to_owned())
+            let forced = request.always.iter().any(|prefix| name.starts_with(prefix));
+            let lacks = forced || !here.contains(package.as_str());
+            let excluded =
+                request.without_dependencies.contains(&name) || request.never.contains(&name);
+            (lacks && !excluded).then(|| name.to_owned())
         })
         .collect()
 }
@@ -451,7 +470,7 @@ mod tests {
     const LINE: &str = "'http://archive/pool/rustc-web_1.deb' rustc-web_1.96.0+dfsg1-1~deb12u2_amd64.deb 4450500 SHA256:8fef";
 
     #[test]
-    fn reads_what_apt_get_says_and_what_it_wrote_itself() {
+    fn packages_are_parsed_from_apt_gets_output_and_from_the_written_list() {
         let package = Package::parse(LINE).unwrap();
         assert_eq!(
             (package.name(), package.version()),
@@ -473,7 +492,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_the_system_lacks_is_fetched() {
+    fn only_packages_that_the_system_lacks_are_fetched() {
         let plan = "Reading package lists...\n\
             'http://a/libc6' libc6_2.36-9_amd64.deb 5 MD5Sum:00\n\
             'http://a/zlib1g' zlib1g_1%3a1.2.13_amd64.deb 5 MD5Sum:00\n\
@@ -486,27 +505,27 @@ mod tests {
             installed libcap2_1:2.66-4_i386\n\
             config-files libgone_1_amd64\n\
             installed qemu-x_1_all\n";
-        let wanted = Wanted {
+        let request = Request {
             what: "QEMU",
-            alone: &["rustc"],
-            whole: &[],
-            own: &["qemu"],
+            without_dependencies: &["rustc"],
+            with_dependencies: &[],
+            always: &["qemu"],
             never: &["libc6"],
             suite: None,
             check: |_| Ok(()),
             room: |bytes| bytes,
         };
         assert_eq!(
-            lacking(plan, here, &wanted),
+            lacking(plan, here, &request),
             ["libcap2", "libgone", "qemu-x"]
         );
-        let wanted = Wanted {
+        let request = Request {
             never: &[],
-            own: &[],
-            ..wanted
+            always: &[],
+            ..request
         };
         assert_eq!(
-            lacking(plan, here, &wanted),
+            lacking(plan, here, &request),
             ["libc6", "libcap2", "libgone"]
         );
     }

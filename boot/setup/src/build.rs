@@ -14,13 +14,13 @@ use std::process::Command;
 use anyhow::Context;
 use tempfile::TempDir;
 
-use super::cache::Locked;
+use super::cache::LockedCache;
 use super::pin;
 use super::settings;
 use super::sha256::sha256;
 use super::toolchain::Toolchain;
-use system::Step;
-use system::child::{self, Event};
+use system::Progress;
+use system::child::{self, ChildEvent};
 
 /// The folder in the cache that is the cargo home of the kernel's build.
 const CARGO_HOME: &str = "cargo";
@@ -29,32 +29,33 @@ const PACKAGE: &str = "crystal-ball-kernel";
 const TARGET: &str = "x86_64-unknown-none";
 const IMAGE_MAKER: &str = "crystal-ball-image";
 
-/// Part of the hash in the image maker's name. Change it when the way to build the image maker changes.
-const WAY: &[u8] = b"2: without the user's settings";
+/// The version of the build commands, a part of the hash in the image maker's name. Change it when
+/// [`image_maker`] builds the image maker in another way.
+const RECIPE: &[u8] = b"2: without the user's settings";
 
 /// A program for the bare machine. Each program has a separate image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Program {
     /// The demo.
-    Show,
+    Demo,
     /// The benchmark kernel.
-    Measure,
+    Bench,
 }
 
 impl Program {
     /// Returns the name of the binary in the kernel's package.
     fn binary(self) -> &'static str {
         match self {
-            Self::Show => "crystal-ball-kernel",
-            Self::Measure => "crystal-ball-measure",
+            Self::Demo => "crystal-ball-kernel",
+            Self::Bench => "crystal-ball-measure",
         }
     }
 
     /// Returns the file name of the image.
     fn image(self) -> &'static str {
         match self {
-            Self::Show => "crystal-ball.img",
-            Self::Measure => "measure.img",
+            Self::Demo => "crystal-ball.img",
+            Self::Bench => "measure.img",
         }
     }
 }
@@ -97,7 +98,11 @@ pub fn files(program: Program) -> [PathBuf; 2] {
 }
 
 /// Builds a program's kernel, and returns its path.
-pub fn kernel(cache: &Locked, toolchain: &Toolchain, program: Program) -> anyhow::Result<PathBuf> {
+pub fn kernel(
+    cache: &LockedCache,
+    toolchain: &Toolchain,
+    program: Program,
+) -> anyhow::Result<PathBuf> {
     let folder = neutral(cache)?;
     // The home must stay at one path: cargo rebuilds packages that it finds at another path.
     let mut cargo = cargo(toolchain, &cache.path(CARGO_HOME), folder.path())?;
@@ -130,14 +135,14 @@ pub fn kernel(cache: &Locked, toolchain: &Toolchain, program: Program) -> anyhow
 
 /// Returns the image maker for this compiler, from the cache or newly built. The build is by far the longest
 /// step.
-pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<PathBuf> {
+pub fn image_maker(cache: &LockedCache, toolchain: &Toolchain) -> anyhow::Result<PathBuf> {
     let (name, sources) = image_maker_name(toolchain)?;
     let place = cache.path(&name);
-    if is_whole(&place) {
+    if is_intact(&place) {
         return Ok(place.join(IMAGE_MAKER));
     }
     cache.room(pin::BUILDS, "building the boot loader")?;
-    let aside = cache.aside()?;
+    let temporary = cache.temporary_folder()?;
     let folder = neutral(cache)?;
     // `cargo install` reads the configuration files above its home, so the home lies in the neutral folder.
     let home = folder.path().join("home");
@@ -146,9 +151,9 @@ pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<Path
         .args(["build", "--manifest-path"])
         .arg(sources.join("Cargo.toml"))
         .args(["--locked", "--target-dir"])
-        .arg(aside.path());
+        .arg(temporary.path());
     // The boot loader's build runs more cargos, which build in the folder for temporary files.
-    cargo.env("TMPDIR", aside.path());
+    cargo.env("TMPDIR", temporary.path());
     build(
         &mut cargo,
         &format!(
@@ -156,10 +161,10 @@ pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<Path
             toolchain.release()
         ),
     )?;
-    let made = aside.path().join("made");
+    let made = temporary.path().join("made");
     fs::create_dir(&made)?;
     fs::rename(
-        aside.path().join("debug").join(IMAGE_MAKER),
+        temporary.path().join("debug").join(IMAGE_MAKER),
         made.join(IMAGE_MAKER),
     )?;
     fs::write(
@@ -173,37 +178,38 @@ pub fn image_maker(cache: &Locked, toolchain: &Toolchain) -> anyhow::Result<Path
 /// the folder of its sources.
 pub fn image_maker_name(toolchain: &Toolchain) -> anyhow::Result<(String, PathBuf)> {
     let folder = root().join("boot/image");
-    let mut all = [WAY, toolchain.version.as_bytes()].concat();
+    let mut all = [RECIPE, toolchain.version.as_bytes()].concat();
     for file in ["Cargo.toml", "Cargo.lock", "src/main.rs"] {
         let file = folder.join(file);
-        all.extend(fs::read(&file).with_context(|| format!("{} cannot be read", file.display()))?);
+        all.extend(fs::read(&file).with_context(|| format!("{}: cannot be read", file.display()))?);
     }
     Ok((format!("image-{}", &sha256(&all)[..16]), folder))
 }
 
 /// Returns whether the cached image maker in `place` exists and is unchanged.
-pub fn is_whole(place: &Path) -> bool {
-    let said = fs::read_to_string(place.join("sha256"));
-    fs::read(place.join(IMAGE_MAKER)).is_ok_and(|data| said.is_ok_and(|said| said == sha256(&data)))
+pub fn is_intact(place: &Path) -> bool {
+    let expected = fs::read_to_string(place.join("sha256"));
+    fs::read(place.join(IMAGE_MAKER))
+        .is_ok_and(|data| expected.is_ok_and(|expected| expected == sha256(&data)))
 }
 
 /// Makes the image, and returns its path.
 ///
-/// The image is made on every run: it takes a tenth of a second, and an image with an outdated kernel would
+/// The image is made on every run: that lasts a tenth of a second, and an image with an outdated kernel would
 /// be worse. The name of an image with a ramdisk has the ramdisk's hash, because two runs with different
 /// models may work at the same time.
 pub fn image(maker: &Path, program: Program, ramdisk: Option<&[u8]>) -> anyhow::Result<PathBuf> {
     let [kernel, mut image] = files(program);
     let [_, folder] = folders();
     fs::create_dir_all(&folder)?;
-    let aside = tempfile::Builder::new()
-        .prefix(".aside")
+    let temporary = tempfile::Builder::new()
+        .prefix(".temporary")
         .tempdir_in(&folder)?;
-    let made = aside.path().join(program.image());
+    let made = temporary.path().join(program.image());
     let mut make = child::command(maker);
     make.arg(&kernel).arg(&made);
     if let Some(bytes) = ramdisk {
-        let file = aside.path().join("ramdisk");
+        let file = temporary.path().join("ramdisk");
         fs::write(&file, bytes).context("the ramdisk cannot be written")?;
         make.arg(file);
         image.set_file_name(format!("model-{}.img", &sha256(bytes)[..16]));
@@ -211,7 +217,7 @@ pub fn image(maker: &Path, program: Program, ramdisk: Option<&[u8]>) -> anyhow::
     child::run(&mut make).context("the disk image cannot be made")?;
     // Another run may be booting the old image. It keeps the old file, because the rename puts a new file in
     // its place.
-    fs::rename(made, &image).with_context(|| format!("{} cannot be written", image.display()))?;
+    fs::rename(made, &image).with_context(|| format!("{}: cannot be written", image.display()))?;
     Ok(image)
 }
 
@@ -221,13 +227,13 @@ pub fn cargo_path() -> anyhow::Result<PathBuf> {
         Some(cargo) => Ok(cargo.into()),
         None => which::which("cargo")
             .ok()
-            .context("cargo is needed, and not in PATH"),
+            .context("cargo: not found in PATH"),
     }
 }
 
 /// Returns a folder without the user's configuration. The lock of the cache ensures that only one build uses
 /// it.
-fn neutral(cache: &Locked) -> anyhow::Result<TempDir> {
+fn neutral(cache: &LockedCache) -> anyhow::Result<TempDir> {
     settings::neutral(cache.folder().as_os_str())
 }
 
@@ -257,16 +263,23 @@ fn first_in_path(folder: &Path) -> anyhow::Result<OsString> {
             .into_iter()
             .chain(env::split_paths(&path)),
     )
-    .context("the cache's path cannot stand in PATH")
+    .with_context(|| {
+        format!(
+            "{}: PATH cannot contain this folder; set XDG_CACHE_HOME to a folder without ':' in its path",
+            folder.display()
+        )
+    })
 }
 
 /// Runs a build. Without work it prints nothing; otherwise it announces `what` and shows cargo's messages.
 fn build(cargo: &mut Command, what: &str) -> anyhow::Result<()> {
     let mut step = None;
     let done = child::watch(cargo, |event| match event {
-        Event::Line(line) if line.trim_start().starts_with("Finished ") => {}
-        Event::Line(line) => step.get_or_insert_with(|| Step::new(what, 0)).line(line),
-        Event::Tick => {
+        ChildEvent::Line(line) if line.trim_start().starts_with("Finished ") => {}
+        ChildEvent::Line(line) => step
+            .get_or_insert_with(|| Progress::new(what, 0))
+            .line(line),
+        ChildEvent::Tick => {
             if let Some(step) = &mut step {
                 step.at(0);
             }
@@ -281,7 +294,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn target_folder_is_the_one_of_this_program() {
+    fn the_target_folder_contains_this_program() {
         assert!(
             env::current_exe().unwrap().starts_with(target()),
             "{}",

@@ -18,7 +18,8 @@ use system::{Interrupted, interrupted};
 use system::{bytes, say};
 
 const LOCK: &str = "lock";
-const ASIDE: &str = "aside";
+/// The folder of the temporary folders.
+const TEMPORARY: &str = "temporary";
 
 /// The cache folder, which may not exist yet.
 pub struct Cache {
@@ -29,7 +30,7 @@ impl Cache {
     /// Returns the cache's place: a folder in the user's cache folder, by the XDG rules.
     pub fn find() -> anyhow::Result<Self> {
         let places = etcetera::base_strategy::Xdg::new().context(
-            "no home folder: set HOME or XDG_CACHE_HOME to a folder that can be written",
+            "no folder for the cache: HOME and XDG_CACHE_HOME are not set; set one of them to a writable folder",
         )?;
         Ok(Self {
             folder: places.cache_dir().join("crystal-ball"),
@@ -37,22 +38,22 @@ impl Cache {
     }
 
     /// Creates the folder, waits for other set-ups, and removes the temporary folders of killed runs.
-    pub fn lock(self) -> anyhow::Result<Locked> {
+    pub fn lock(self) -> anyhow::Result<LockedCache> {
         let unusable = || {
             format!(
-                "the cache folder {} cannot be used; XDG_CACHE_HOME chooses another place",
+                "{}: the cache folder cannot be used; set XDG_CACHE_HOME to choose another folder",
                 self.folder.display()
             )
         };
         fs::create_dir_all(&self.folder).with_context(unusable)?;
         let lock = File::create(self.path(LOCK)).with_context(unusable)?;
         wait(&lock, &self.path(LOCK))?;
-        let aside = self.path(ASIDE);
-        if aside.exists() {
-            remove(&aside)?;
+        let temporary = self.path(TEMPORARY);
+        if temporary.exists() {
+            remove(&temporary)?;
         }
-        fs::create_dir(&aside).with_context(unusable)?;
-        Ok(Locked {
+        fs::create_dir(&temporary).with_context(unusable)?;
+        Ok(LockedCache {
             cache: self,
             _lock: lock,
         })
@@ -71,20 +72,20 @@ impl Cache {
 
 fn wait(lock: &File, path: &Path) -> anyhow::Result<()> {
     let begun = Instant::now();
-    let mut said = false;
+    let mut reported = false;
     loop {
         match lock.try_lock() {
             Ok(()) => return Ok(()),
             Err(TryLockError::Error(error)) => {
-                return Err(error).context("the cache cannot be locked");
+                return Err(error).with_context(|| format!("{}: cannot be locked", path.display()));
             }
             Err(TryLockError::WouldBlock) if interrupted() => return Err(Interrupted.into()),
             Err(TryLockError::WouldBlock) => {}
         }
-        if !said && begun.elapsed() > Duration::from_secs(1) {
-            said = true;
+        if !reported && begun.elapsed() > Duration::from_secs(1) {
+            reported = true;
             say(format_args!(
-                "waiting for another set-up, which holds {}",
+                "waiting for another set-up to release {}",
                 path.display()
             ));
         }
@@ -94,12 +95,12 @@ fn wait(lock: &File, path: &Path) -> anyhow::Result<()> {
 }
 
 /// The locked cache: only this process may change it.
-pub struct Locked {
+pub struct LockedCache {
     cache: Cache,
     _lock: File,
 }
 
-impl Deref for Locked {
+impl Deref for LockedCache {
     type Target = Cache;
 
     fn deref(&self) -> &Cache {
@@ -107,21 +108,26 @@ impl Deref for Locked {
     }
 }
 
-impl Locked {
+impl LockedCache {
     /// Creates a temporary folder in the cache's file system.
-    pub fn aside(&self) -> anyhow::Result<TempDir> {
-        TempDir::new_in(self.path(ASIDE)).context("the cache cannot be written")
+    pub fn temporary_folder(&self) -> anyhow::Result<TempDir> {
+        let folder = self.path(TEMPORARY);
+        TempDir::new_in(&folder).with_context(|| format!("{}: cannot be written", folder.display()))
     }
 
     /// Puts the finished `made` in its place in the cache, and removes the entry that was there.
     pub fn put(&self, made: &Path, name: &str) -> anyhow::Result<PathBuf> {
         let place = self.path(name);
-        let old = self.aside()?;
+        let old = self.temporary_folder()?;
         if place.exists() {
             fs::rename(&place, old.path().join("old"))?;
         }
-        fs::rename(made, &place)
-            .with_context(|| format!("{} cannot be put in place", place.display()))?;
+        fs::rename(made, &place).with_context(|| {
+            format!(
+                "{}: the new cache entry cannot be moved here",
+                place.display()
+            )
+        })?;
         Ok(place)
     }
 
@@ -140,9 +146,10 @@ impl Locked {
         let free = free(self.folder())?;
         if free < needed {
             let text = format!(
-                "{what} needs {} in {}, and {} are free: make room, or set XDG_CACHE_HOME to a folder on another disk",
-                bytes(needed),
+                "{}: {what} needs {} of disk space, but {} are free; free some space, or set XDG_CACHE_HOME to a folder \
+                 on another disk",
                 self.folder().display(),
+                bytes(needed),
                 bytes(free)
             );
             return Err(io::Error::new(ErrorKind::StorageFull, text).into());
@@ -154,7 +161,7 @@ impl Locked {
 /// Returns the free bytes, for an ordinary user, in the file system of `folder`.
 pub fn free(folder: &Path) -> anyhow::Result<u64> {
     let disk = rustix::fs::statvfs(folder)
-        .with_context(|| format!("the free space of {} is unknown", folder.display()))?;
+        .with_context(|| format!("{}: the free disk space cannot be read", folder.display()))?;
     Ok(disk.f_bavail * disk.f_frsize)
 }
 
@@ -172,7 +179,7 @@ pub fn is_full(error: &anyhow::Error) -> bool {
     by_kind
         || ["No space left on device", "Disk quota exceeded"]
             .iter()
-            .any(|words| text.contains(words))
+            .any(|message| text.contains(message))
 }
 
 /// Removes a file, or a folder with its contents.
@@ -182,7 +189,7 @@ pub fn remove(path: &Path) -> anyhow::Result<()> {
     } else {
         fs::remove_file(path)
     }
-    .with_context(|| format!("{} cannot be removed", path.display()))
+    .with_context(|| format!("{}: cannot be removed", path.display()))
 }
 
 /// Returns the bytes of all files in a folder. Files that cannot be read count as 0.
@@ -206,7 +213,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_made_aside_replaces_what_was_there() {
+    fn a_finished_entry_replaces_the_old_entry() {
         let place = tempfile::tempdir().unwrap();
         let locked = Cache {
             folder: place.path().join("new"),
@@ -214,18 +221,18 @@ mod tests {
         .lock()
         .unwrap();
         for content in ["first", "second"] {
-            let aside = locked.aside().unwrap();
-            fs::create_dir(aside.path().join("made")).unwrap();
-            fs::write(aside.path().join("made/file"), content).unwrap();
-            let kept = locked.put(&aside.path().join("made"), "kept").unwrap();
+            let temporary = locked.temporary_folder().unwrap();
+            fs::create_dir(temporary.path().join("made")).unwrap();
+            fs::write(temporary.path().join("made/file"), content).unwrap();
+            let kept = locked.put(&temporary.path().join("made"), "kept").unwrap();
             assert_eq!(fs::read_to_string(kept.join("file")).unwrap(), content);
         }
-        assert_eq!(fs::read_dir(locked.path(ASIDE)).unwrap().count(), 0);
+        assert_eq!(fs::read_dir(locked.path(TEMPORARY)).unwrap().count(), 0);
         assert_eq!(size(&locked.path("kept")), 6);
     }
 
     #[test]
-    fn too_small_a_disk_is_said_before_the_download() {
+    fn too_little_disk_space_is_reported_before_the_download() {
         let place = tempfile::tempdir().unwrap();
         let locked = Cache {
             folder: place.path().to_owned(),
@@ -235,18 +242,19 @@ mod tests {
         locked.room(1, "a little").unwrap();
         let error = locked.room(1 << 60, "the world").unwrap_err().to_string();
         assert!(
-            error.starts_with("the world needs 1.00 EiB in ") && error.contains("are free"),
+            error.contains(": the world needs 1.00 EiB of disk space, but ")
+                && error.contains("are free"),
             "{error}"
         );
     }
 
     #[test]
-    fn full_disk_is_known_by_kind_and_by_a_childs_words() {
+    fn a_full_disk_is_recognised_by_error_kind_and_by_a_childs_output() {
         let of_system = io::Error::from_raw_os_error(28);
         let error = anyhow::Error::from(of_system).context("cannot be written");
         assert!(is_full(&error));
-        let words = "`dpkg -x` failed\ntar: x: Cannot write: No space left on device";
-        assert!(is_full(&anyhow::Error::msg(words)));
+        let message = "`dpkg -x` failed\ntar: x: Cannot write: No space left on device";
+        assert!(is_full(&anyhow::Error::msg(message)));
         assert!(!is_full(&anyhow::Error::msg("no network")));
         assert!(!is_full(&io::Error::from_raw_os_error(2).into()));
     }

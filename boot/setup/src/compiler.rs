@@ -5,9 +5,10 @@ use std::env;
 use anyhow::bail;
 use system::{Interrupted, say};
 
-use super::cache::{Cache, Locked, is_full};
+use super::cache::{Cache, LockedCache, is_full};
+use super::options::Options;
 use super::toolchain::{self, Toolchain, VARIABLE};
-use super::{Options, debian, pin, rustup};
+use super::{debian, pin, rustup};
 
 /// Finds a toolchain without a download: the user's choice, the cache's, or rustup's.
 ///
@@ -27,7 +28,7 @@ pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Toolchain
             Ok(toolchain) => return Ok(Some(toolchain)),
             Err(error) if error.is::<Interrupted>() => return Err(error),
             Err(error) => say(format_args!(
-                "the kept toolchain is damaged and not used: {error:#}"
+                "the cached toolchain is damaged and is not used: {error:#}"
             )),
         }
     }
@@ -38,7 +39,7 @@ pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Toolchain
 ///
 /// # Errors
 /// If every way failed. The message says what was tried.
-pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Toolchain> {
+pub fn get(cache: &LockedCache, options: &Options) -> anyhow::Result<Toolchain> {
     if let Some(toolchain) = find(cache, options)? {
         return Ok(toolchain);
     }
@@ -48,7 +49,7 @@ pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Toolchain> {
         Err(error) => error,
     };
     say(format_args!(
-        "Rust {} does not come from rustup ({}); trying Debian's packages",
+        "rustup cannot provide Rust {} ({}); trying Debian's packages",
         pin::RUST,
         reason(&by_rustup)
     ));
@@ -58,12 +59,12 @@ pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Toolchain> {
         Err(error) => error,
     };
     bail!(
-        "Rust {} with its library sources is needed, and both ways to get it failed.\n\
+        "Rust {} with its library sources cannot be provided: rustup and Debian's packages both failed.\n\
          - rustup: {}\n\
          - Debian's packages: {}\n\
-         Do one of these by hand, then try again:\n\
-         - with rustup: {}\n\
-         - with any complete toolchain in a folder DIR: --toolchain DIR, or {VARIABLE}=DIR",
+         Do one of these, then try again:\n\
+         - use rustup: {}\n\
+         - use a complete toolchain in a folder DIR: --toolchain DIR, or {VARIABLE}=DIR",
         pin::RUST,
         indented(&by_rustup),
         indented(&by_debian),
@@ -75,7 +76,7 @@ pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Toolchain> {
 pub fn by_hand() -> String {
     let first = match which::which("rustup") {
         Ok(_) => "",
-        Err(_) => "install rustup (https://rustup.rs; it needs no administrator), then ",
+        Err(_) => "install rustup (https://rustup.rs; no administrator is needed), then ",
     };
     format!(
         "{first}rustup toolchain install {} --profile minimal --component rust-src --component llvm-tools",
@@ -86,10 +87,10 @@ pub fn by_hand() -> String {
 /// Returns an error in one line: the error that a program printed, or else the message's first line.
 fn reason(error: &anyhow::Error) -> String {
     let text = format!("{error:#}");
-    let said = text
+    let own = text
         .lines()
         .find_map(|line| line.trim().strip_prefix("error: "));
-    said.or(text.lines().next()).unwrap_or_default().to_owned()
+    own.or(text.lines().next()).unwrap_or_default().to_owned()
 }
 
 fn indented(error: &anyhow::Error) -> String {
@@ -101,7 +102,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reason_is_the_programs_own_error() {
+    fn the_reason_is_the_error_that_the_program_printed() {
         let of = |text: &'static str| reason(&anyhow::Error::msg(text));
         assert_eq!(
             of("`rustup x` failed (exit status: 1)\ninfo: syncing\nerror: no network\n more"),

@@ -11,21 +11,21 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::apt::{self, MACHINE, Package, Wanted};
-use super::cache::{self, Cache, Locked, is_full};
+use super::apt::{self, MACHINE, Package, Request};
+use super::cache::{self, Cache, LockedCache, is_full};
 use super::pin;
 use super::toolchain::{self, Toolchain, VARIABLE};
 use system::say;
 use system::{Interrupted, child};
 
 /// The request for the compiler's packages.
-const WANTED: Wanted = Wanted {
+const REQUEST: Request = Request {
     what: "Rust",
     // Without dependencies: `rustc-web` depends on a C compiler, and a system with cargo already has a C
     // compiler.
-    alone: &pin::DEBIAN_RUST,
-    whole: &pin::DEBIAN_LLVM,
-    own: &pin::DEBIAN_LLVM,
+    without_dependencies: &pin::DEBIAN_RUST,
+    with_dependencies: &pin::DEBIAN_LLVM,
+    always: &pin::DEBIAN_LLVM,
     // The scripts set `LD_LIBRARY_PATH`. The linker inherits it, and another C library would break the
     // linker.
     never: &["libc6", "libgcc-s1", "libstdc++6"],
@@ -35,36 +35,36 @@ const WANTED: Wanted = Wanted {
 };
 
 /// Makes the toolchain from the packages in the cache, or from newly fetched packages.
-pub fn install(cache: &Locked) -> anyhow::Result<Toolchain> {
+pub fn install(cache: &LockedCache) -> anyhow::Result<Toolchain> {
     let folder = kept(cache);
     if let Some(packages) = apt::kept(&folder) {
         match make(cache, &packages, &folder) {
             Err(error) if !error.is::<Interrupted>() && !is_full(&error) => say(format_args!(
-                "the packages kept do not make a toolchain, and are fetched again: {error:#}"
+                "the cached packages do not make a toolchain and are downloaded again: {error:#}"
             )),
             done => return done,
         }
     }
     let what = format!("Rust {}", pin::RUST);
-    let wanted = Wanted {
+    let request = Request {
         what: &what,
-        ..WANTED
+        ..REQUEST
     };
-    let packages = apt::fetch(cache, &wanted, &folder)?;
+    let packages = apt::fetch(cache, &request, &folder)?;
     make(cache, &packages, &folder)
 }
 
 /// Unpacks the packages, and puts the toolchain in its place in the cache.
-fn make(cache: &Locked, packages: &[Package], folder: &Path) -> anyhow::Result<Toolchain> {
+fn make(cache: &LockedCache, packages: &[Package], folder: &Path) -> anyhow::Result<Toolchain> {
     cache.room(
         pin::DEBIAN_UNPACKED + pin::BUILDS,
         "Rust from Debian's packages",
     )?;
-    let aside = cache.aside()?;
+    let temporary = cache.temporary_folder()?;
     let what = "Rust from Debian's packages (about 15 s)";
-    apt::unpack(what, packages, folder, aside.path())?;
-    let made = aside.path().join("usr");
-    arrange(&made).context("Debian's packages are not laid out as expected")?;
+    apt::unpack(what, packages, folder, temporary.path())?;
+    let made = temporary.path().join("usr");
+    arrange(&made).context("Debian's packages do not have the expected layout")?;
     toolchain::keep(cache, &made)
 }
 
@@ -77,8 +77,8 @@ fn check(package: &Package) -> anyhow::Result<()> {
         .is_some_and(|rest| !rest.starts_with(|c: char| c.is_ascii_digit()));
     if name.contains("rust") && !pinned {
         bail!(
-            "the archive has {name} {version}, and this project is pinned to {}: \
-             give a complete toolchain of that version with --toolchain DIR or {VARIABLE}=DIR",
+            "{name}: Debian's archive has version {version}, but Rust {} is required; \
+             choose a complete toolchain of that version with --toolchain DIR or {VARIABLE}=DIR",
             pin::RUST
         );
     }
@@ -125,7 +125,7 @@ fn arrange(usr: &Path) -> anyhow::Result<()> {
 /// renamed later.
 fn script(usr: &Path, name: &str, up: &str, program: &str) -> anyhow::Result<()> {
     if !usr.join(program).exists() {
-        bail!("there is no {program}");
+        bail!("{program}: missing");
     }
     let text = format!(
         "#!/bin/sh\ntop=${{0%/*}}/{up}\nLD_LIBRARY_PATH=$top/lib/{MACHINE}-linux-gnu exec \"$top/{program}\" \"$@\"\n"
@@ -141,7 +141,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn only_the_compilers_packages_have_the_pinned_version() {
+    fn only_the_compilers_packages_must_have_the_pinned_version() {
         let pinned = |file: &str| check(&Package::of_file(file)).is_ok();
         assert!(pinned("rustc-web_1.96.0+dfsg1-1_amd64.deb"));
         assert!(pinned("llvm-22_1%3a22.1.8-1_amd64.deb"));

@@ -6,8 +6,10 @@ use std::path::Path;
 
 use super::cache::{self, Cache};
 use super::offline::offline;
+use super::options::Options;
+use super::qemu::Qemu;
 use super::toolchain::Toolchain;
-use super::{Options, Qemu, apt, build, compiler, debian, pin, qemu};
+use super::{apt, build, compiler, debian, pin, qemu};
 use system::bytes;
 use system::child;
 
@@ -25,8 +27,8 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
         .all(|(_, line)| !matches!(line, Err(Missing::ByHand(_))));
     let later = |found: Option<String>| {
         found.ok_or_else(|| match can_build {
-            true => Missing::NextRun("makes it".to_owned()),
-            false => Missing::ByHand("it cannot be built without the above".to_owned()),
+            true => Missing::NextRun("builds it".to_owned()),
+            false => Missing::ByHand("cannot be built before the missing parts above".to_owned()),
         })
     };
     if let Ok(Some(toolchain)) = &toolchain {
@@ -34,12 +36,12 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
         let maker = cache.path(&name);
         lines.push((
             "boot loader",
-            later(build::is_whole(&maker).then(|| maker.display().to_string())),
+            later(build::is_intact(&maker).then(|| maker.display().to_string())),
         ));
     }
     for (what, file) in ["kernel", "disk image"]
         .into_iter()
-        .zip(build::files(build::Program::Show))
+        .zip(build::files(build::Program::Demo))
     {
         let found = file
             .exists()
@@ -70,7 +72,10 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
         .find_map(|name| Some((name, env::var(name).ok()?)));
     also(
         "display",
-        screen.map_or("none".to_owned(), |(name, value)| format!("{name}={value}")),
+        screen.map_or(
+            "no WAYLAND_DISPLAY or DISPLAY".to_owned(),
+            |(name, value)| format!("{name}={value}"),
+        ),
     )?;
     let folder = cache.folder();
     let existing = folder
@@ -89,16 +94,20 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
     )?;
     also(
         "packages",
-        format!("{} kept", bytes(cache::size(&debian::kept(&cache)))),
+        format!(
+            "{} of Debian's packages in the cache",
+            bytes(cache::size(&debian::kept(&cache)))
+        ),
     )?;
     for program in ["rustup", "apt-get", "setpriv"] {
-        let found =
-            which::which(program).map_or("none".to_owned(), |path| path.display().to_string());
+        let found = which::which(program).map_or("not installed".to_owned(), |path| {
+            path.display().to_string()
+        });
         also(program, found)?;
     }
     also(
         "network",
-        offline().map_or("may be used".to_owned(), |setting| {
+        offline().map_or("allowed".to_owned(), |setting| {
             format!("not used ({setting})")
         }),
     )?;
@@ -118,7 +127,7 @@ fn cargo_line() -> Result<String, Missing> {
     match build::cargo_path().and_then(|cargo| Ok((version(&cargo)?, cargo))) {
         Ok((version, cargo)) => Ok(format!("{} in {}", version.trim(), cargo.display())),
         Err(error) => Err(Missing::ByHand(format!(
-            "{error:#}\ninstall rustup, which brings cargo: https://rustup.rs"
+            "{error:#}\ninstall rustup, which includes cargo: https://rustup.rs"
         ))),
     }
 }
@@ -144,7 +153,7 @@ fn toolchain_line(
             pin::RUST
         ))
     } else if apt::is_here() && apt::kept(&debian::kept(cache)).is_some() {
-        Missing::NextRun("unpacks the packages that are kept".to_owned())
+        Missing::NextRun("unpacks the packages in the cache".to_owned())
     } else if online && apt::is_here() {
         Missing::NextRun(format!(
             "downloads Debian's packages of Rust {} into the cache",

@@ -1,4 +1,4 @@
-//! The set-up that `cargo run` and `cargo test` do on first use, so that no user has to remember it.
+//! Provides everything that a boot needs, on the first `cargo run` or `cargo test`, without a step by hand.
 //!
 //! It provides what a run needs and a new machine lacks: the pinned compiler with its library sources, the
 //! boot loader built by that compiler, the kernel, the disk image, and QEMU. The user needs only a stable
@@ -9,6 +9,18 @@
 //! each test in a separate process, and the set-up never assumes that another process has finished. A cache
 //! entry is made in a temporary folder and renamed, so that it is complete or missing at every point at
 //! which this program can be killed. An entry is verified before use, and made again if it is damaged.
+//!
+//! The report of [`doctor`] needs no set-up and changes nothing:
+//!
+//! ```
+//! # fn main() -> anyhow::Result<()> {
+//! let mut report = Vec::new();
+//! setup::doctor(&setup::Options::default(), &mut report)?;
+//! let report = String::from_utf8(report)?;
+//! assert!(["cargo", "toolchain", "QEMU", "cache"].iter().all(|part| report.contains(part)));
+//! # Ok(())
+//! # }
+//! ```
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -22,6 +34,7 @@ mod compiler;
 mod debian;
 mod doctor;
 mod offline;
+mod options;
 mod pin;
 mod qemu;
 mod rustup;
@@ -32,21 +45,8 @@ mod toolchain;
 use build::Program;
 pub use build::root;
 use cache::Cache;
+pub use options::Options;
 pub use qemu::Qemu;
-
-/// The user's choices about the set-up.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// A complete Rust toolchain to use instead of the pinned one. The variable `CRYSTAL_BALL_TOOLCHAIN` has
-    /// the same effect.
-    pub toolchain: Option<PathBuf>,
-    /// The QEMU to use, instead of the one in `PATH` or in the cache.
-    pub qemu: Option<PathBuf>,
-    /// Whether the user wants a window. If so, a QEMU that can open a window is preferred, or fetched.
-    pub window: bool,
-    /// The contents of the kernel's ramdisk, usually a model file.
-    pub ramdisk: Option<Vec<u8>>,
-}
 
 /// The files and the QEMU that a boot needs.
 #[derive(Debug, Clone)]
@@ -71,7 +71,7 @@ pub fn folder() -> PathBuf {
 /// If a part cannot be provided: the message says what was tried, why it failed and what to do by hand.
 /// [`Interrupted`](system::Interrupted) if the user stopped the program.
 pub fn ready(options: &Options) -> anyhow::Result<Ready> {
-    ready_with(options, Program::Show)
+    ready_with(options, Program::Demo)
 }
 
 /// Does the set-up for the benchmark kernel, which has a separate image. See [`ready`].
@@ -79,12 +79,12 @@ pub fn ready(options: &Options) -> anyhow::Result<Ready> {
 /// # Errors
 /// As [`ready`].
 pub fn ready_to_measure(options: &Options) -> anyhow::Result<Ready> {
-    ready_with(options, Program::Measure)
+    ready_with(options, Program::Bench)
 }
 
 fn ready_with(options: &Options, program: Program) -> anyhow::Result<Ready> {
     let cache = Cache::find()?.lock()?;
-    // QEMU comes first: without a way to get it, this fails at once, and the other parts take minutes.
+    // QEMU comes first: without a way to get it, the set-up fails at once, and the other parts need minutes.
     let qemu = qemu::get(&cache, options)?;
     let (kernel, image) = boot_files(&cache, options, program)?;
     Ok(Ready {
@@ -119,11 +119,11 @@ pub fn qemu(options: &Options) -> anyhow::Result<Qemu> {
 /// # Errors
 /// As [`ready`].
 pub fn image(options: &Options) -> anyhow::Result<PathBuf> {
-    Ok(boot_files(&Cache::find()?.lock()?, options, Program::Show)?.1)
+    Ok(boot_files(&Cache::find()?.lock()?, options, Program::Demo)?.1)
 }
 
 fn boot_files(
-    cache: &cache::Locked,
+    cache: &cache::LockedCache,
     options: &Options,
     program: Program,
 ) -> anyhow::Result<(PathBuf, PathBuf)> {
@@ -135,13 +135,13 @@ fn boot_files(
     let ramdisk = options
         .ramdisk
         .as_deref()
-        .filter(|_| program == Program::Show);
+        .filter(|_| program == Program::Demo);
     let image = build::image(&maker, program, ramdisk)?;
     Ok((kernel, image))
 }
 
-/// Writes what the set-up has and what is missing, and installs nothing. Returns whether a run has all that
-/// it needs.
+/// Writes a report of the parts that exist and the parts that are missing, and installs nothing. Returns
+/// whether no part is missing.
 ///
 /// # Errors
 /// If `out` cannot be written, or no folder can hold the cache.

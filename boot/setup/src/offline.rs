@@ -22,8 +22,8 @@ fn offline_by(variable: Option<&str>, folder: &Path, home: Option<&Path>) -> Opt
         return matches!(value, "true" | "1").then(|| OFFLINE.to_owned());
     }
     let mut files = settings::files(folder, home).into_iter();
-    let (says, file) = files.find_map(|file| Some((net_offline(&file)?, file)))?;
-    says.then(|| format!("net.offline in {}", file.display()))
+    let (is_offline, file) = files.find_map(|file| Some((net_offline(&file)?, file)))?;
+    is_offline.then(|| format!("net.offline in {}", file.display()))
 }
 
 fn net_offline(file: &Path) -> Option<bool> {
@@ -37,7 +37,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn offline_is_what_cargo_says_in_its_order() {
+    fn the_offline_setting_is_found_in_cargos_order() {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
         let (folder, home) = (at("up/down"), at("home"));
@@ -47,8 +47,8 @@ mod tests {
         let by = |variable| offline_by(variable, &folder, Some(&home));
         let file = |name: &str| Some(format!("net.offline in {}", at(name).display()));
         assert_eq!(by(None), None);
-        for said in ["true", "1"] {
-            assert_eq!(by(Some(said)).as_deref(), Some(OFFLINE));
+        for value in ["true", "1"] {
+            assert_eq!(by(Some(value)).as_deref(), Some(OFFLINE));
         }
         fs::write(at("home/config.toml"), "[net]\noffline = true").unwrap();
         assert_eq!(by(None), file("home/config.toml"));

@@ -11,9 +11,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::Options;
-use super::apt::{self, MACHINE, Wanted};
-use super::cache::{Cache, Locked, is_full};
+use super::apt::{self, MACHINE, Request};
+use super::cache::{Cache, LockedCache, is_full};
+use super::options::Options;
 use system::say;
 use system::{Interrupted, child};
 
@@ -35,15 +35,15 @@ pub struct Qemu {
 
 impl Qemu {
     fn check(path: PathBuf) -> anyhow::Result<Self> {
-        let failed = || format!("{} does not work as a QEMU", path.display());
-        let said = child::run(child::command(&path).arg("--version")).with_context(failed)?;
-        let Some((_, version)) = said
+        let failed = || format!("{}: not a working QEMU", path.display());
+        let output = child::run(child::command(&path).arg("--version")).with_context(failed)?;
+        let Some((_, version)) = output
             .lines()
             .next()
             .unwrap_or_default()
             .split_once(" version ")
         else {
-            bail!("{}: it does not print its version", failed());
+            bail!("{}: `--version` prints no version", failed());
         };
         let help =
             child::run(child::command(&path).args(["-display", "help"])).with_context(failed)?;
@@ -61,8 +61,8 @@ impl Qemu {
             .any(|display| display == "gtk" || display == "sdl")
     }
 
-    /// Returns whether the program has all that the options ask for.
-    fn will_do(&self, options: &Options) -> bool {
+    /// Returns whether the program meets the options: a window, if the user wants one.
+    fn satisfies(&self, options: &Options) -> bool {
         self.has_window() || !options.window
     }
 }
@@ -85,15 +85,20 @@ fn displays(help: &str) -> Vec<String> {
 pub fn find(cache: &Cache, options: &Options) -> anyhow::Result<Option<Qemu>> {
     if let Some(path) = &options.qemu {
         let found = which::which(path);
-        let found = found.with_context(|| format!("{} does not exist", path.display()))?;
+        let found = found.with_context(|| {
+            format!(
+                "{}: not found; give the path of a {PROGRAM}",
+                path.display()
+            )
+        })?;
         return Qemu::check(found).map(Some);
     }
     let system = which::which(PROGRAM).ok().map(Qemu::check).transpose()?;
-    if system.as_ref().is_some_and(|qemu| qemu.will_do(options)) {
+    if system.as_ref().is_some_and(|qemu| qemu.satisfies(options)) {
         return Ok(system);
     }
     let unpacked = in_cache(cache, None)?;
-    let better = unpacked.filter(|qemu| system.is_none() || qemu.will_do(options));
+    let better = unpacked.filter(|qemu| system.is_none() || qemu.satisfies(options));
     Ok(better.or(system))
 }
 
@@ -113,7 +118,9 @@ fn in_cache(cache: &Cache, suite: Option<&str>) -> anyhow::Result<Option<Qemu>> 
         Ok(qemu) => Ok(Some(qemu)),
         Err(error) if error.is::<Interrupted>() => Err(error),
         Err(error) => {
-            say(format_args!("the kept QEMU is not used: {error:#}"));
+            say(format_args!(
+                "the cached QEMU does not work and is not used: {error:#}"
+            ));
             Ok(None)
         }
     }
@@ -124,11 +131,11 @@ fn in_cache(cache: &Cache, suite: Option<&str>) -> anyhow::Result<Option<Qemu>> 
 /// # Errors
 /// If no way to get a QEMU works: the message says what was tried and what to do. A missing window is not an
 /// error.
-pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Qemu> {
+pub fn get(cache: &LockedCache, options: &Options) -> anyhow::Result<Qemu> {
     let found = find(cache, options)?;
     // A QEMU that the user chose is used without a check for a window.
     if let Some(qemu) = &found
-        && (qemu.will_do(options) || options.qemu.is_some())
+        && (qemu.satisfies(options) || options.qemu.is_some())
     {
         return Ok(qemu.clone());
     }
@@ -137,17 +144,17 @@ pub fn get(cache: &Locked, options: &Options) -> anyhow::Result<Qemu> {
         (Err(error), _) if error.is::<Interrupted>() || is_full(&error) => Err(error),
         (Err(error), Some(qemu)) => {
             say(format_args!(
-                "{} cannot open a window, and no other QEMU was found: {error:#}\n{}",
+                "{}: this QEMU cannot open a window, and no other QEMU can be provided: {error:#}\n{}",
                 qemu.path.display(),
                 by_hand("qemu-system-gui")
             ));
             Ok(qemu)
         }
-        (Err(error), None) => Err(error.context(format!(
-            "QEMU is needed, and is neither installed nor to be had from Debian's packages\n{}\n\
-             - name a {PROGRAM} that you have: --qemu PATH",
+        (Err(error), None) => bail!(
+            "QEMU: not installed, and Debian's packages cannot provide it: {error:#}\n{}\n\
+             - give the path of a {PROGRAM}: --qemu PATH",
             by_hand(PACKAGES[0])
-        ))),
+        ),
     }
 }
 
@@ -165,10 +172,12 @@ pub fn by_hand(package: &str) -> String {
 ///
 /// # Errors
 /// If the suite does not exist, or its packages cannot be fetched.
-pub fn of_suite(cache: &Locked, suite: &str) -> anyhow::Result<Qemu> {
+pub fn of_suite(cache: &LockedCache, suite: &str) -> anyhow::Result<Qemu> {
     let name = |c: char| c.is_ascii_alphanumeric() || "-._".contains(c);
     if !suite.starts_with(|c: char| c.is_ascii_alphanumeric()) || !suite.chars().all(name) {
-        bail!("'{suite}' is not the name of a Debian suite; one is: bookworm-backports");
+        bail!(
+            "--suite '{suite}': not the name of a Debian suite; give a name such as bookworm-backports"
+        );
     }
     match in_cache(cache, Some(suite))? {
         Some(qemu) => Ok(qemu),
@@ -177,30 +186,33 @@ pub fn of_suite(cache: &Locked, suite: &str) -> anyhow::Result<Qemu> {
 }
 
 /// Unpacks Debian's packages of QEMU into the cache.
-fn unpack(cache: &Locked, window: bool, suite: Option<&str>) -> anyhow::Result<Qemu> {
+fn unpack(cache: &LockedCache, window: bool, suite: Option<&str>) -> anyhow::Result<Qemu> {
     let what = if window {
         "QEMU and its window"
     } else {
         "QEMU"
     };
-    let wanted = Wanted {
+    let request = Request {
         what,
-        alone: &[],
-        whole: &PACKAGES[..1 + usize::from(window)],
+        without_dependencies: &[],
+        with_dependencies: &PACKAGES[..1 + usize::from(window)],
         // Fetched in any case, because the system's packages may be of another version than the program.
-        own: &["qemu-", "seabios", "ipxe-qemu"],
+        always: &["qemu-", "seabios", "ipxe-qemu"],
         never: &[],
         suite,
         check: |_| Ok(()),
-        // Measured: the unpacked files take 4 times the space of the packages.
+        // Measured: the unpacked files need 4 times the space of the packages.
         room: |bytes| 5 * bytes,
     };
-    let aside = cache.aside()?;
-    let (packages, made) = (aside.path().join("packages"), aside.path().join("made"));
+    let temporary = cache.temporary_folder()?;
+    let (packages, made) = (
+        temporary.path().join("packages"),
+        temporary.path().join("made"),
+    );
     fs::create_dir(&made)?;
-    let list = apt::fetch(cache, &wanted, &packages)?;
+    let list = apt::fetch(cache, &request, &packages)?;
     apt::unpack(what, &list, &packages, &made)?;
-    arrange(&made).context("Debian's packages are not laid out as expected")?;
+    arrange(&made).context("Debian's packages do not have the expected layout")?;
     // A check before the new QEMU replaces an older one in the cache.
     Qemu::check(made.join("bin").join(PROGRAM))?;
     let place = cache.put(&made, &folder(suite))?;
@@ -213,7 +225,7 @@ fn unpack(cache: &Locked, window: bool, suite: Option<&str>) -> anyhow::Result<Q
 fn arrange(made: &Path) -> anyhow::Result<()> {
     let libraries = format!("usr/lib/{MACHINE}-linux-gnu");
     if !made.join("usr/bin").join(PROGRAM).exists() {
-        bail!("there is no usr/bin/{PROGRAM}");
+        bail!("usr/bin/{PROGRAM}: missing");
     }
     let mut folders = BTreeSet::new();
     with_libraries(made, Path::new(&libraries), &mut folders)?;
@@ -266,7 +278,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn reads_the_displays_of_old_and_new_versions() {
+    fn the_displays_of_old_and_new_versions_are_read() {
         let old = "Available display backend types:\nnone\ngtk\negl-headless\n";
         let new =
             format!("{old}\nSome display backends support suboptions, which can be set with\n");

@@ -8,11 +8,11 @@ use std::path::Path;
 
 use anyhow::{Context, bail};
 
-use super::cache::{self, Locked};
+use super::cache::{self, LockedCache};
 use super::offline::offline;
 use super::pin;
 use super::toolchain::{self, Toolchain};
-use system::Step;
+use system::Progress;
 use system::child;
 
 /// Returns the user's toolchain of the pinned version, if it is complete. It stays where it is.
@@ -29,7 +29,7 @@ pub fn installed() -> Option<Toolchain> {
 }
 
 /// Downloads the pinned toolchain into the cache.
-pub fn download(cache: &Locked) -> anyhow::Result<Toolchain> {
+pub fn download(cache: &LockedCache) -> anyhow::Result<Toolchain> {
     if let Some(setting) = offline() {
         bail!("cargo is offline ({setting}), so nothing is downloaded");
     }
@@ -37,7 +37,7 @@ pub fn download(cache: &Locked) -> anyhow::Result<Toolchain> {
         .ok()
         .context("rustup is not installed")?;
     cache.room(pin::RUSTUP_UNPACKED + pin::BUILDS, "Rust from rustup")?;
-    let home = cache.aside()?;
+    let home = cache.temporary_folder()?;
     let mut install = child::family(rustup);
     install.args([
         "toolchain",
@@ -52,20 +52,20 @@ pub fn download(cache: &Locked) -> anyhow::Result<Toolchain> {
         .env("RUSTUP_HOME", home.path())
         .env_remove("RUSTUP_TOOLCHAIN");
     let what = format!(
-        "getting Rust {} by rustup, once (about 15 s of work besides the download)",
+        "downloading Rust {} with rustup, once (about 15 s in addition to the download)",
         pin::RUST
     );
-    let mut step = Step::new(what, pin::RUSTUP_UNPACKED);
+    let mut step = Progress::new(what, pin::RUSTUP_UNPACKED);
     child::watch(&mut install, |event| {
         step.on(event, || cache::size(home.path()))
     })?;
     drop(step);
-    let toolchains =
-        fs::read_dir(home.path().join("toolchains")).context("rustup installed nothing")?;
+    let toolchains = fs::read_dir(home.path().join("toolchains"))
+        .context("rustup: no toolchain was installed")?;
     let made = toolchains
         .flatten()
         .next()
-        .context("rustup installed nothing")?
+        .context("rustup: no toolchain was installed")?
         .path();
     toolchain::keep(cache, &made)
 }

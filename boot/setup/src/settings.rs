@@ -196,7 +196,7 @@ fn network(files: &[PathBuf]) -> Table {
 /// # Errors
 /// If `place` cannot be written.
 pub fn make_home(place: &Path, folder: &Path, user: Option<&Path>) -> anyhow::Result<()> {
-    let unusable = || format!("{} cannot be made a cargo home", place.display());
+    let unusable = || format!("{}: no cargo home can be made here", place.display());
     let mut settings = network(&files(folder, user));
     // Cargo's automatic clean-up would remove packages that the user's cargo still uses.
     let never = Table::from_iter([("auto-clean-frequency".to_owned(), "never".into())]);
@@ -243,7 +243,11 @@ pub fn neutral(name: &OsStr) -> anyhow::Result<TempDir> {
     let mut why = Vec::new();
     for place in places {
         if let Some(file) = harmful(&place) {
-            why.push(format!("{} is above {}", file.display(), place.display()));
+            why.push(format!(
+                "{}: {} applies there",
+                place.display(),
+                file.display()
+            ));
             continue;
         }
         match neutral_in(&place, name) {
@@ -253,7 +257,8 @@ pub fn neutral(name: &OsStr) -> anyhow::Result<TempDir> {
     }
     why.dedup();
     bail!(
-        "the boot loader must be built without cargo's configuration, and no folder for temporary files will do:\n  {}\n\
+        "the boot loader must be built in a folder that no cargo configuration applies to, and every folder for \
+         temporary files failed:\n  {}\n\
          move that configuration to $CARGO_HOME/config.toml, or set TMPDIR to another folder",
         why.join("\n  ")
     )
@@ -279,12 +284,12 @@ fn neutral_in(place: &Path, name: &OsStr) -> std::io::Result<TempDir> {
 /// build.
 fn harmful(folder: &Path) -> Option<PathBuf> {
     let folder = folder.canonicalize().ok()?;
-    let says_more = |file: &PathBuf| {
+    let has_other_tables = |file: &PathBuf| {
         let table = read(file);
         let known = |name: &String| [&NETWORK[..], &HARMLESS].concat().contains(&name.as_str());
         !table.keys().all(known)
     };
-    files(&folder, None).into_iter().find(says_more)
+    files(&folder, None).into_iter().find(has_other_tables)
 }
 
 #[cfg(test)]
@@ -343,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn nested_home_has_the_network_settings_alone() {
+    fn the_nested_cargo_home_has_only_the_network_settings() {
         let place = tempfile::tempdir().unwrap();
         let at = |name: &str| place.path().join(name);
         write(
@@ -407,7 +412,7 @@ mod tests {
     }
 
     #[test]
-    fn neutral_folder_is_not_below_a_configuration() {
+    fn the_neutral_folder_is_not_below_a_cargo_configuration() {
         let place = tempfile::tempdir().unwrap();
         let folder = place.path().join("down");
         fs::create_dir(&folder).unwrap();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 
-use super::cache::Locked;
+use super::cache::LockedCache;
 use super::pin;
 use system::{child, say};
 
@@ -28,13 +28,13 @@ impl Toolchain {
     /// Checks that the toolchain in a folder is complete.
     ///
     /// # Errors
-    /// If it is not: the message names every missing part.
+    /// If a part is missing: the message names every missing part.
     pub fn check(folder: &Path) -> anyhow::Result<Self> {
-        let incomplete = || format!("{} is not a complete toolchain", folder.display());
+        let incomplete = || format!("{}: not a complete toolchain", folder.display());
         let folder = folder.canonicalize().with_context(incomplete)?;
         let rustc = folder.join("bin/rustc");
         if !rustc.exists() {
-            bail!("{}: it has no bin/rustc", incomplete());
+            bail!("{}: bin/rustc is missing", incomplete());
         }
         let version = child::run(
             child::command(&rustc)
@@ -55,7 +55,11 @@ impl Toolchain {
         .filter(|part| !folder.join(part.split(' ').next().unwrap_or(part)).exists())
         .collect();
         if !missing.is_empty() {
-            bail!("{}: it lacks\n  {}", incomplete(), missing.join("\n  "));
+            bail!(
+                "{}: these parts are missing:\n  {}",
+                incomplete(),
+                missing.join("\n  ")
+            );
         }
         Ok(Self { folder, version })
     }
@@ -65,7 +69,11 @@ impl Toolchain {
         let toolchain = Self::check(folder)?;
         let release = toolchain.release();
         if release != pin::RUST {
-            bail!("{} is Rust {release}, not {}", folder.display(), pin::RUST);
+            bail!(
+                "{}: this toolchain is Rust {release}, but {} is required",
+                folder.display(),
+                pin::RUST
+            );
         }
         Ok(toolchain)
     }
@@ -88,7 +96,7 @@ pub fn cached() -> String {
 }
 
 /// Puts a finished toolchain of the pinned version into the cache.
-pub fn keep(cache: &Locked, made: &Path) -> anyhow::Result<Toolchain> {
+pub fn keep(cache: &LockedCache, made: &Path) -> anyhow::Result<Toolchain> {
     Toolchain::check_pinned(made)?;
     let place = cache.put(made, &cached())?;
     say(format_args!("Rust {} is in {}", pin::RUST, place.display()));

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use frames::golden;
-use qemu::{Config, Machine};
+use qemu::{Config, Vm};
 use system::say;
 
 use crate::common::Common;
@@ -18,8 +18,8 @@ Examples:
 pub fn run(common: &Common, folder: Option<PathBuf>) -> anyhow::Result<()> {
     let folder = folder.unwrap_or_else(crystal_ball::golden_folder);
     let report = setup::folder().join("bless").join("report.html");
-    let boot = || Machine::boot(&Config::new(&setup::ready(&common.options)?));
-    match golden::bless(&folder, &report, boot, Machine::leave, |line| say(line))? {
+    let boot = || Vm::boot(&Config::new(&setup::ready(&common.options)?));
+    match golden::bless(&folder, &report, boot, Vm::leave, |line| say(line))? {
         0 => say("nothing to bless: no golden frame has changed"),
         count => say(format_args!(
             "{count} golden frames blessed in {}",

@@ -6,7 +6,7 @@ use crystal_ball::window;
 use frames::backend::Backend;
 use frames::options::FrameOptions;
 use protocol::{Action, Change, Command};
-use qemu::{Config, Machine};
+use qemu::{Config, Vm};
 use system::{say, write_atomically};
 
 use crate::common::{Common, has_display};
@@ -41,7 +41,7 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
     let name = png_name(frame_options, config.model_file);
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
-    let mut machine = Machine::boot(&Config {
+    let mut machine = Vm::boot(&Config {
         display: display.unwrap_or("none").to_string(),
         ..config
     })?;

@@ -14,9 +14,9 @@ use bench::{BenchRequest, Figure, LENGTHS, MAX_ROUNDS, Work};
 use protocol::OK;
 use texmap::{Mapper, Order};
 
-use qemu::Machine;
+use qemu::Vm;
 use setup::{Options, Ready};
-use system::Step;
+use system::Progress;
 
 mod accesses;
 
@@ -258,7 +258,7 @@ pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
     let mut memories = BenchMemories::default();
     let mut emulated = EmulatedBenches::new(&mut memories);
     let all = config.cpus.len() * config.mappers.len() * Order::ALL.len() * 2;
-    let mut step = Step::counting("measuring in QEMU", all as u64);
+    let mut step = Progress::counting("measuring in QEMU", all as u64);
     let mut done = 0..;
     let mut tick = || step.at(done.next().unwrap_or(0));
     let mut cpus = Vec::new();
@@ -307,7 +307,7 @@ fn combinations(config: &MeasureConfig) -> impl Iterator<Item = (Mapper, Order)>
 
 /// A machine that runs the benchmark kernel.
 struct Guest {
-    machine: Machine,
+    machine: Vm,
 }
 
 impl Guest {
@@ -315,7 +315,7 @@ impl Guest {
         let arguments = ["-cpu", cpu.name()]
             .into_iter()
             .chain(arguments.iter().copied());
-        let machine = Machine::boot(&qemu::Config {
+        let machine = Vm::boot(&qemu::Config {
             arguments: arguments.map(Into::into).collect(),
             ..qemu::Config::new(ready)
         })?;

@@ -28,7 +28,7 @@ use texmap::loops::Loop;
 use texmap::{Mapper, Order};
 
 use crate::measure::{self, KernelFigures};
-use system::Step;
+use system::Progress;
 use system::write_atomically;
 
 pub mod accuracy;
@@ -221,7 +221,7 @@ fn measure(
     let mut tables = Vec::new();
     let mut galleries = Vec::new();
     let mut column = None;
-    let mut step = Step::counting("measuring scenes", scenes.len() as u64);
+    let mut step = Progress::counting("measuring scenes", scenes.len() as u64);
     for (done, name) in (1..).zip(scenes) {
         let add = |workload: &Workload<'_>| {
             let number = TIMED.min(workload.frames.len() - 1);
@@ -251,7 +251,7 @@ fn measure(
         step.at(done);
     }
     drop(step);
-    let mut step = Step::counting("sweeping span lengths and angles", SWEEPS as u64);
+    let mut step = Progress::counting("sweeping span lengths and angles", SWEEPS as u64);
     let mut done = 0;
     let (sweep, unrolling) = workload::with("tilted", seed, |workload| {
         let sweep = cost::sweep(workload, mappers, effort, || {

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context;
 
 /// Symbolic links that are followed in a row: as many as Linux follows.
-const LINKS: usize = 40;
+const MAX_LINKS: usize = 40;
 
 /// Writes a temporary file in the same folder, and renames it to `path` when it is complete.
 ///
@@ -25,19 +25,19 @@ pub fn write_atomically<T>(
 ) -> anyhow::Result<T> {
     let context = || format!("{} cannot be written", path.display());
     if fs::metadata(path).is_ok_and(|data| !data.is_file()) {
-        let mut there = OpenOptions::new()
+        let mut target = OpenOptions::new()
             .write(true)
             .open(path)
             .with_context(context)?;
-        return write(&mut there).with_context(context);
+        return write(&mut target).with_context(context);
     }
-    let place = follow(path).with_context(context)?;
+    let path = follow(path).with_context(context)?;
     let mut file = tempfile::Builder::new()
         .permissions(Permissions::from_mode(0o666))
-        .tempfile_in(folder(&place))
+        .tempfile_in(folder(&path))
         .with_context(context)?;
     let written = write(file.as_file_mut()).with_context(context)?;
-    file.persist(&place).with_context(context)?;
+    file.persist(&path).with_context(context)?;
     Ok(written)
 }
 
@@ -51,10 +51,10 @@ fn folder(path: &Path) -> &Path {
 /// Returns the end of a chain of links. `canonicalize` fails if the target does not exist yet.
 fn follow(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
-    for _ in 0..LINKS {
+    for _ in 0..MAX_LINKS {
         match fs::read_link(&path) {
             Ok(link) => path = folder(&path).join(link),
-            // Not a link, or nothing at all.
+            // `path` is not a link, or does not exist.
             Err(_) => return Ok(path),
         }
     }
@@ -75,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_replaced_only_by_a_complete_one() {
+    fn a_failed_write_leaves_the_old_file() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("file");
         fs::write(&path, "old").unwrap();
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn links_stay_and_lead_to_the_file() {
+    fn a_symbolic_link_stays_and_its_target_is_replaced() {
         let folder = tempfile::tempdir().unwrap();
         let at = |name: &str| folder.path().join(name);
         fs::create_dir(at("sub")).unwrap();
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn devices_and_fifos_are_written_into() {
+    fn devices_and_fifos_are_written_to_directly() {
         let folder = tempfile::tempdir().unwrap();
         let (link, fifo) = (folder.path().join("link"), folder.path().join("fifo"));
         symlink("/dev/null", &link).unwrap();

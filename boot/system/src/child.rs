@@ -1,10 +1,14 @@
 //! Child processes that end with this program.
 //!
+//! All uses of `setpriv` and of shell scripts to start a process are in this module.
+//!
 //! A host program that is killed must not leave a QEMU, a download or a compiler behind. No clean-up code of
 //! ours can run after a `SIGKILL`, so the operating system has to end the children. Linux does so by the
-//! parent-death signal, which a child requests for itself. std offers that only through unsafe code, so
-//! util-linux's `setpriv` makes the request where it is installed. Without `setpriv`, children still end with
-//! every ordinary end of this program.
+//! parent-death signal, which a child requests for itself. util-linux's `setpriv` makes the request where it
+//! is installed. Without `setpriv`, children still end with every ordinary end of this program.
+//!
+//! This is by hand, in this module only: a process can set the signal of itself alone, so a crate (`rustix`,
+//! `nix`, `process-wrap`, `command-group`) would still need `CommandExt::pre_exec`, which is unsafe.
 //!
 //! **The signal belongs to the thread** that started the child, not to the process: Linux sends it when that
 //! thread ends. So one thread starts the child and waits for it. [`run`] and [`watch`] return only after the
@@ -12,6 +16,7 @@
 
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, Read};
+use std::os::fd::OwnedFd;
 use std::os::unix::process::CommandExt;
 use std::process::{Command, Stdio};
 use std::sync::OnceLock;
@@ -22,20 +27,30 @@ use anyhow::Context;
 use console::strip_ansi_codes;
 use rustix::process::{Pid, Signal, kill_process_group};
 
-use crate::{Interrupted, interrupted};
+use crate::interrupt::{Interrupted, interrupted};
 
 /// Lines of a failed child's error output that the error message repeats.
 const TAIL_LINES: usize = 20;
 
 /// Arguments in front of the program's name when `setpriv` starts the program.
-const TIED_ARGUMENTS: usize = 8;
+const WRAPPER_ARGUMENTS: usize = 8;
 
 /// Ends at once if the parent ended before `setpriv` made its request: the signal would never come.
-const ALONE: &str = r#"[ "$PPID" = "$1" ] || exit 1; shift; exec "$@""#;
+const SINGLE_SCRIPT: &str = r#"[ "$PPID" = "$1" ] || exit 1; shift; exec "$@""#;
 
 /// The same for a program that starts others: the shell stays, leads the process group, and ends all of it.
-const FAMILY: &str =
+const GROUP_SCRIPT: &str =
     r#"trap 'kill -KILL 0' TERM; [ "$PPID" = "$1" ] || exit 1; shift; "$@" & wait $!"#;
+
+/// The descriptors of the sockets of [`command_with_sockets`] in the child.
+pub const SOCKETS: [i32; 2] = [3, 4];
+
+/// Moves the sockets from standard input and output to the descriptors [`SOCKETS`].
+///
+/// The standard library passes only the standard descriptors to a child. A descriptor that every child
+/// inherits would also reach the children of other threads, and this program would then not notice that the
+/// child has closed its end.
+const SOCKETS_SCRIPT: &str = r#"exec "$@" 3<&0 4>&1 </dev/null >&2"#;
 
 /// Returns a command whose process ends with this program, even by `SIGKILL`.
 ///
@@ -43,7 +58,17 @@ const FAMILY: &str =
 /// With `setpriv`, a missing program gives exit code 127 and no error of `spawn`, so find the program first.
 /// The [module](self) explains the rule about threads.
 pub fn command(program: impl AsRef<OsStr>) -> Command {
-    tied("KILL", ALONE, program.as_ref())
+    with_death_signal("KILL", SINGLE_SCRIPT, program.as_ref())
+}
+
+/// Returns a command as [`command`] does, whose process also has `sockets` as the descriptors [`SOCKETS`].
+/// Its standard input is empty, and its standard output goes to standard error.
+pub fn command_with_sockets(program: impl AsRef<OsStr>, sockets: [OwnedFd; 2]) -> Command {
+    let [first, second] = sockets;
+    let mut command = command("sh");
+    command.args(["-c", SOCKETS_SCRIPT, "sh"]).arg(program);
+    command.stdin(first).stdout(second);
+    command
 }
 
 /// Returns a command for a program that starts others, such as cargo or apt-get: all of them end with this
@@ -52,10 +77,10 @@ pub fn command(program: impl AsRef<OsStr>) -> Command {
 /// Grandchildren do not inherit the parent-death signal, so a shell receives it for the whole process group.
 /// Only [`run`] and [`watch`] make that group.
 pub fn family(program: impl AsRef<OsStr>) -> Command {
-    tied("TERM", FAMILY, program.as_ref())
+    with_death_signal("TERM", GROUP_SCRIPT, program.as_ref())
 }
 
-fn tied(signal: &str, script: &str, program: &OsStr) -> Command {
+fn with_death_signal(signal: &str, script: &str, program: &OsStr) -> Command {
     static SETPRIV: OnceLock<Option<std::path::PathBuf>> = OnceLock::new();
     let Some(setpriv) = SETPRIV.get_or_init(|| which::which("setpriv").ok()) else {
         return Command::new(program);
@@ -68,7 +93,7 @@ fn tied(signal: &str, script: &str, program: &OsStr) -> Command {
 
 /// What [`watch`] reports about a running child.
 #[derive(Debug, Clone, Copy)]
-pub enum Event<'a> {
+pub enum ChildEvent<'a> {
     /// A line of its error output.
     Line(&'a str),
     /// Time has passed; reported a few times a second.
@@ -88,10 +113,10 @@ pub fn run(command: &mut Command) -> anyhow::Result<String> {
 ///
 /// # Errors
 /// As [`run`].
-pub fn watch(command: &mut Command, mut report: impl FnMut(Event)) -> anyhow::Result<String> {
+pub fn watch(command: &mut Command, mut report: impl FnMut(ChildEvent)) -> anyhow::Result<String> {
     const TICK: Duration = Duration::from_millis(200);
     let line = line(command);
-    // With a process group of its own, Ctrl-C and failure can end the children's children as well.
+    // In a separate process group, Ctrl-C and failure can end the children's children as well.
     command
         .process_group(0)
         .stdin(Stdio::null())
@@ -118,7 +143,7 @@ pub fn watch(command: &mut Command, mut report: impl FnMut(Event)) -> anyhow::Re
         match receive.recv_timeout(TICK.saturating_sub(ticked.elapsed())) {
             Ok((Stream::Out, text)) => output.push_str(&text),
             Ok((Stream::Err, text)) => {
-                report(Event::Line(text.trim_end()));
+                report(ChildEvent::Line(text.trim_end()));
                 errors.push(text);
             }
             // The pipes are closed; the child is about to end.
@@ -143,7 +168,7 @@ pub fn watch(command: &mut Command, mut report: impl FnMut(Event)) -> anyhow::Re
                 match stream {
                     Stream::Out => output.push_str(&text),
                     Stream::Err => {
-                        report(Event::Line(text.trim_end()));
+                        report(ChildEvent::Line(text.trim_end()));
                         errors.push(text);
                     }
                 }
@@ -152,7 +177,7 @@ pub fn watch(command: &mut Command, mut report: impl FnMut(Event)) -> anyhow::Re
         }
         if ticked.elapsed() >= TICK {
             ticked = Instant::now();
-            report(Event::Tick);
+            report(ChildEvent::Tick);
         }
     };
     if status.success() {
@@ -194,16 +219,16 @@ fn read_lines(
     })
 }
 
-/// Returns the command line as a user would type it into a shell, without the part that `setpriv` needs.
+/// Returns the command line as a user would type it into a shell, without the wrapper of `setpriv` and `sh`.
 pub fn line(command: &Command) -> String {
-    let own = [command.get_program()]
+    let all = [command.get_program()]
         .into_iter()
         .chain(command.get_args());
-    let tied = command
+    let wrapped = command
         .get_args()
         .next()
         .is_some_and(|first| first == "--pdeathsig");
-    let words = own.skip(if tied { 1 + TIED_ARGUMENTS } else { 0 });
+    let words = all.skip(if wrapped { 1 + WRAPPER_ARGUMENTS } else { 0 });
     words
         .map(|word| quoted(&word.to_string_lossy()))
         .collect::<Vec<_>>()
@@ -222,6 +247,7 @@ fn quoted(word: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::net::UnixStream;
     use std::os::unix::process::ExitStatusExt;
 
     use super::*;
@@ -233,12 +259,12 @@ mod tests {
     }
 
     #[test]
-    fn output_is_returned_and_errors_are_reported_by_line() {
+    fn output_is_returned_and_error_output_is_reported_by_line() {
         let mut lines = Vec::new();
         let output = watch(
             &mut shell("echo one; echo two >&2; printf three >&2; echo four"),
             |event| {
-                if let Event::Line(line) = event {
+                if let ChildEvent::Line(line) = event {
                     lines.push(line.to_owned());
                 }
             },
@@ -248,7 +274,7 @@ mod tests {
     }
 
     #[test]
-    fn failure_names_the_command_and_ends_with_its_last_words() {
+    fn a_failed_command_is_reported_with_its_last_lines() {
         let error = run(&mut shell("seq 1 50 >&2; exit 3"))
             .unwrap_err()
             .to_string();
@@ -264,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn line_is_what_a_shell_reads_as_the_same_words() {
+    fn the_command_line_can_be_pasted_into_a_shell() {
         let words = [
             "-name",
             "Crystal Ball",
@@ -287,14 +313,30 @@ mod tests {
     }
 
     #[test]
-    fn background_process_with_our_pipes_is_not_waited_for() {
+    fn run_does_not_wait_for_a_background_process_that_holds_the_pipes() {
         let begun = Instant::now();
         run(command("sh").args(["-c", "sleep 20 & echo"])).unwrap();
         assert!(begun.elapsed() < Duration::from_secs(10));
     }
 
     #[test]
-    fn child_dies_with_the_thread_that_started_it() {
+    fn a_command_gets_its_sockets_as_descriptors_3_and_4() {
+        let [(mut first, child_first), (mut second, child_second)] =
+            [(); 2].map(|()| UnixStream::pair().unwrap());
+        let mut command = command_with_sockets("sh", [child_first.into(), child_second.into()]);
+        command.args(["-c", "echo three >&3; echo four >&4"]);
+        assert!(command.status().unwrap().success());
+        // The command holds the child's ends of the sockets.
+        drop(command);
+        for (socket, expected) in [(&mut first, "three\n"), (&mut second, "four\n")] {
+            let mut text = String::new();
+            socket.read_to_string(&mut text).unwrap();
+            assert_eq!(text, expected);
+        }
+    }
+
+    #[test]
+    fn a_child_ends_with_the_thread_that_started_it() {
         let spawn = || {
             let mut command = command("sh");
             let mut child = command

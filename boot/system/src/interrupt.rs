@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Makes Ctrl-C, `SIGTERM` and `SIGHUP` set a flag ([`interrupted`]) in place of ending the program, so that the
-/// program can remove its temporary folders. A second signal ends the program at once.
+/// Makes Ctrl-C, `SIGTERM` and `SIGHUP` set a flag ([`interrupted`]) in place of ending the program, so that
+/// the program can remove its temporary folders. A second signal ends the program at once.
 pub fn catch_interrupts() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

@@ -1,5 +1,24 @@
-//! What the other host crates need of the operating system: child processes that end with this program,
+//! Access to the operating system for the other host crates: child processes that end with this program,
 //! interrupts by the user, atomic writes, safe quotation, and progress on standard error.
+//!
+//! A write that fails leaves the old file:
+//!
+//! ```
+//! use std::io::Write;
+//!
+//! # fn main() -> anyhow::Result<()> {
+//! let folder = tempfile::tempdir()?;
+//! let path = folder.path().join("dump");
+//! system::write_atomically(&path, |file| Ok(file.write_all(b"complete")?))?;
+//! let failed = system::write_atomically(&path, |file| {
+//!     file.write_all(b"half")?;
+//!     anyhow::bail!("the disk is full") as anyhow::Result<()>
+//! });
+//! assert!(failed.is_err());
+//! assert_eq!(std::fs::read(&path)?, b"complete");
+//! # Ok(())
+//! # }
+//! ```
 #![forbid(unsafe_code)]
 
 mod atomic;
@@ -10,4 +29,4 @@ pub mod quote;
 
 pub use atomic::write_atomically;
 pub use interrupt::{Interrupted, catch_interrupts, interrupted};
-pub use progress::{Step, bytes, say};
+pub use progress::{Progress, bytes, say};

@@ -1,8 +1,8 @@
 //! Messages and progress on standard error.
 //!
 //! On a terminal progress is a moving bar; elsewhere, such as in the log of a CI job, it is a line now and
-//! then. Nothing here uses `eprintln!`: libtest captures its output, and a first `cargo test` would be silent for
-//! minutes.
+//! then. Nothing here uses `eprintln!`: libtest captures its output, and a first `cargo test` would be silent
+//! for minutes.
 
 use std::fmt::Display;
 use std::io::{IsTerminal, Write, stderr};
@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use indicatif::{HumanBytes, ProgressBar, ProgressStyle};
 
-use crate::child::Event;
+use crate::child::ChildEvent;
 use crate::quote;
 
 /// The longest silence without a terminal.
-const SILENCE: Duration = Duration::from_secs(10);
+const MAX_SILENCE: Duration = Duration::from_secs(10);
 
 /// Writes a message to standard error. The message is lost if standard error is closed.
 ///
@@ -30,20 +30,20 @@ pub fn bytes(count: u64) -> impl Display {
     HumanBytes(count)
 }
 
-/// A step that takes a while. It is announced when it is made, and then shows its progress.
+/// The progress of a long step. [`Progress::new`] announces the step.
 #[derive(Debug)]
-pub struct Step {
+pub struct Progress {
     total: u64,
     begun: Instant,
     /// Without a terminal: the time of the last line, and the progress at that time in percent.
-    said: (Instant, u64),
+    last_line: (Instant, u64),
     /// Formats an amount.
     amount: fn(u64) -> String,
     bar: Option<ProgressBar>,
 }
 
-impl Step {
-    /// Begins a step of `total` bytes; 0 if the length is unknown.
+impl Progress {
+    /// Announces a step of `total` bytes; 0 if the length is unknown.
     pub fn new(what: impl Display, total: u64) -> Self {
         let template = match total {
             0 => "  {spinner} {elapsed}",
@@ -52,7 +52,7 @@ impl Step {
         Self::with(what, total, template, |count| bytes(count).to_string())
     }
 
-    /// Begins a step of `total` items.
+    /// Announces a step of `total` items.
     pub fn counting(what: impl Display, total: u64) -> Self {
         let template = "  {wide_bar} {pos} of {len}, {elapsed}";
         Self::with(what, total, template, |count| count.to_string())
@@ -68,13 +68,13 @@ impl Step {
         Self {
             total,
             begun,
-            said: (begun, 0),
+            last_line: (begun, 0),
             amount,
             bar,
         }
     }
 
-    /// Shows that `done` bytes or items are finished. Any number will do if the length is unknown.
+    /// Shows that `done` bytes or items are finished. If the length is unknown, `done` is ignored.
     pub fn at(&mut self, done: u64) {
         // An estimate may exceed the total.
         let done = done.min(self.total);
@@ -83,8 +83,8 @@ impl Step {
             return bar.set_position(done);
         }
         let percent = (done * 100).checked_div(self.total).unwrap_or(0);
-        if percent >= self.said.1 + 10 || self.said.0.elapsed() >= SILENCE {
-            self.said = (Instant::now(), percent);
+        if percent >= self.last_line.1 + 10 || self.last_line.0.elapsed() >= MAX_SILENCE {
+            self.last_line = (Instant::now(), percent);
             match self.total {
                 0 => say(format_args!(
                     "  {} s so far",
@@ -101,7 +101,7 @@ impl Step {
 
     /// Shows a line of a child's output.
     pub fn line(&mut self, text: &str) {
-        self.said.0 = Instant::now();
+        self.last_line.0 = Instant::now();
         match &self.bar {
             Some(bar) => bar.suspend(|| say(text)),
             None => say(text),
@@ -109,14 +109,14 @@ impl Step {
     }
 
     /// Shows progress at each tick of a child, by `done`, and ignores the child's output.
-    pub fn on(&mut self, event: Event, done: impl FnOnce() -> u64) {
-        if let Event::Tick = event {
+    pub fn on(&mut self, event: ChildEvent, done: impl FnOnce() -> u64) {
+        if let ChildEvent::Tick = event {
             self.at(done());
         }
     }
 }
 
-impl Drop for Step {
+impl Drop for Progress {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

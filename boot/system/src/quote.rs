@@ -8,29 +8,29 @@ use std::borrow::Cow;
 use std::path::Path;
 
 /// Longest quotation, in characters.
-const MOST: usize = 40;
+const MAX_CHARACTERS: usize = 40;
 
 /// Returns foreign bytes in single quotes: escaped, and cut after 40 characters.
 ///
 /// A cut quotation ends in `...` and the number of bytes in the original.
 pub fn quoted(bytes: impl AsRef<[u8]>) -> String {
     let bytes = bytes.as_ref();
-    let (mut said, mut length) = (String::from("'"), 0);
+    let (mut quotation, mut length) = (String::from("'"), 0);
     for chunk in bytes.utf8_chunks() {
-        let whole = chunk.valid().chars().map(|c| match c {
+        let valid = chunk.valid().chars().map(|c| match c {
             '\\' => "\\\\".into(),
             c => escaped(c),
         });
         let broken = chunk.invalid().iter().map(|byte| format!("\\x{byte:02x}"));
-        for piece in whole.chain(broken) {
+        for piece in valid.chain(broken) {
             length += piece.chars().count();
-            if length > MOST {
-                return format!("{said}...' ({} bytes)", bytes.len());
+            if length > MAX_CHARACTERS {
+                return format!("{quotation}...' ({} bytes)", bytes.len());
             }
-            said += &piece;
+            quotation += &piece;
         }
     }
-    said + "'"
+    quotation + "'"
 }
 
 /// Returns a path, escaped but not cut, so that the reader can find the file.
@@ -77,8 +77,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nothing_that_a_terminal_obeys_comes_through() {
-        for (bytes, said) in [
+    fn quotations_contain_no_byte_that_a_terminal_obeys() {
+        for (bytes, quotation) in [
             (&b"plain"[..], "'plain'"),
             (b"", "''"),
             (b"\x1b[31mEVIL\x1b[0m", r"'\x1b[31mEVIL\x1b[0m'"),
@@ -91,7 +91,7 @@ mod tests {
                 "'\\u{202e}\\u{2028}\\u{200b}e\u{301}'",
             ),
         ] {
-            assert_eq!(quoted(bytes), said);
+            assert_eq!(quoted(bytes), quotation);
         }
         let all: Vec<u8> = (0..=255).collect();
         for one in all.iter().map(|byte| quoted([*byte])) {
@@ -107,10 +107,13 @@ mod tests {
     }
 
     #[test]
-    fn a_quotation_is_cut_and_never_within_an_escape() {
+    fn a_long_quotation_is_cut_between_two_characters_or_escapes() {
         let long = [b'x'; 20_000];
-        assert_eq!(quoted(&long[..MOST]), format!("'{}'", "x".repeat(MOST)));
-        let cut = format!("'{}...' (20000 bytes)", "x".repeat(MOST));
+        assert_eq!(
+            quoted(&long[..MAX_CHARACTERS]),
+            format!("'{}'", "x".repeat(MAX_CHARACTERS))
+        );
+        let cut = format!("'{}...' (20000 bytes)", "x".repeat(MAX_CHARACTERS));
         assert_eq!(quoted(long), cut);
         let escapes = quoted([0x1b; 100]);
         assert_eq!(escapes, format!("'{}...' (100 bytes)", r"\x1b".repeat(10)));

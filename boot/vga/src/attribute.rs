@@ -85,7 +85,7 @@ impl Attribute {
         if mode.is_some_and(|mode| mode & 1 == 1) != graphics {
             return Err((
                 "AR10 and GR6 disagree about graphics",
-                format!("AR10 = {mode:02X?}, GR6 says graphics: {graphics}"),
+                format!("AR10 = {mode:02X?}, GR6 selects graphics: {graphics}"),
             ));
         }
         Ok(())

@@ -13,9 +13,9 @@ const PROTECT: u8 = 0x80;
 /// Bits that affect no timing: index, mask, the value that Mode X needs, and the bits' purpose. The values
 /// are those of FreeVGA's pages for a mode without text, and of the BIOS's 256-colour mode.
 #[rustfmt::skip]
-const PLAIN: &[(u8, u8, u8, &str)] = &[
+const UNTIMED_BITS: &[(u8, u8, u8, &str)] = &[
     (0x03, 0x80, 0x80, "lets CR10 and CR11 be read"),
-    (0x03, 0x60, 0x00, "the frame is not skewed against the syncs"),
+    (0x03, 0x60, 0x00, "the image is not skewed against the syncs"),
     (0x05, 0x60, 0x00, "the retrace is not skewed"),
     (0x08, 0xFF, 0x00, "no scrolling by lines or bytes"),
     (0x0A, 0xFF, 0x00, "the text cursor: not shown in graphics"),
@@ -36,7 +36,7 @@ const PLAIN: &[(u8, u8, u8, &str)] = &[
 pub enum Latch {
     /// After the last displayed line.
     DisplayEnd,
-    /// When the vertical retrace begins, as FreeVGA says.
+    /// When the vertical retrace begins, as FreeVGA documents.
     #[default]
     RetraceStart,
     /// When the next frame's first line begins.
@@ -87,24 +87,24 @@ impl Crtc {
             .iter()
             .position(|&half| half == index)
         {
-            self.complete();
+            self.update_timing();
             return self
                 .start_written(half, old, value)
                 .err()
                 .into_iter()
                 .collect();
         }
-        let mut complaints: Vec<Complaint> = PLAIN
+        let mut complaints: Vec<Complaint> = UNTIMED_BITS
             .iter()
             .filter(|(of, mask, needed, _)| *of == index && value & mask != *needed)
             .map(|(_, mask, needed, what)| {
-                let bits = format!("bits {mask:02X}h are to be {needed:02X}h");
+                let bits = format!("bits {mask:02X}h must be {needed:02X}h");
                 let state = format!("CR{index:02X} = {value:02X}h: {bits}: {what}");
                 ("unused value", state)
             })
             .collect();
         let first = self.timing.is_none();
-        self.complete();
+        self.update_timing();
         if let Some(timing) = &self.timing {
             complaints.extend(timing.faults((!first).then_some(index)));
         }
@@ -112,7 +112,7 @@ impl Crtc {
     }
 
     /// Computes the timing once all registers are known. The beam stays where it is.
-    fn complete(&mut self) {
+    fn update_timing(&mut self) {
         if self.registers.iter().all(Option::is_some) {
             let beam = self.timing.as_ref().map_or(0, |timing| self.beam(timing));
             let timing = Timing::of(&self.registers.map(Option::unwrap_or_default));
@@ -134,7 +134,7 @@ impl Crtc {
             let other = self.changed[1 - half];
             self.changed[half] = Some(self.frames);
             if other.is_some_and(|frame| frame != self.frames) {
-                let state = "its other half was taken over before".into();
+                let state = "the other half was latched in an earlier frame".into();
                 return Err(("start address is split over a retrace", state));
             }
         }
@@ -157,7 +157,7 @@ impl Crtc {
 
     /// The start addresses of pages that will still be displayed if no further address is written: in the
     /// current frame, and in the frames after it.
-    pub fn seen(&self) -> [Option<u16>; 2] {
+    pub fn displayed_starts(&self) -> [Option<u16>; 2] {
         let Some(timing) = &self.timing else {
             return [None; 2];
         };
@@ -188,7 +188,7 @@ impl Crtc {
     }
 
     /// Character clocks until the start address is next latched.
-    pub fn to_take_over(&self) -> Option<usize> {
+    pub fn clocks_to_latch(&self) -> Option<usize> {
         self.timing.as_ref().map(|_| self.ahead)
     }
 

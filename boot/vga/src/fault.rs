@@ -38,7 +38,7 @@ impl fmt::Display for Access {
 /// An access that real hardware would not perform as intended, or that no scene makes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// The fault's name, for tests and people: fixed words.
+    /// The fault's name, a fixed text that tests compare.
     pub name: &'static str,
     /// The access that caused it.
     pub access: Access,

@@ -1,4 +1,18 @@
-//! A VGA on the host, stricter than real hardware reports.
+//! A VGA on the host that reports every access that real hardware would not perform as intended.
+//!
+//! ```
+//! use modex::registers::{MAP_MASK, SEQUENCER};
+//! use modex::{Bus, ModeX, STRIDE};
+//!
+//! let mut vga = vga::Vga::new();
+//! ModeX::set(&mut vga, &[[0; 3]; 256]).unwrap();
+//! // Map Mask selects plane 2, so a store to address 5000h reaches that plane only.
+//! vga.out16(SEQUENCER, u16::from_le_bytes([MAP_MASK, 1 << 2]));
+//! vga.lane::<STRIDE>(0x5000, 1, |lane| lane.fill(|| 42));
+//! assert_eq!(vga.peek(2, 0x5000), 42);
+//! assert_eq!(vga.peek(3, 0x5000), 0);
+//! assert!(vga.take_faults().is_empty());
+//! ```
 //!
 //! It models, block by block, what the project's scenes use and nothing else. QEMU draws an image from almost
 //! any register values; real cards blank, garble or drop writes. So anything that hardware would not show as

@@ -15,7 +15,7 @@ use crate::fault::Complaint;
 
 /// One direction of a frame: character clocks of a line, or scan lines of a frame.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Axis {
+pub(crate) struct AxisTiming {
     pub total: usize,
     pub shown: usize,
     pub blank: Range<usize>,
@@ -26,9 +26,9 @@ pub(crate) struct Axis {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Timing {
     /// In character clocks.
-    pub across: Axis,
+    pub across: AxisTiming,
     /// In scan lines.
-    pub down: Axis,
+    pub down: AxisTiming,
     /// Scan lines for each line of pixels.
     pub repeat: usize,
     /// Bytes of a plane from one line to the next.
@@ -39,7 +39,7 @@ pub(crate) struct Timing {
 
 /// 320x240 on a VGA monitor.
 pub(crate) const NEEDED: Timing = Timing {
-    across: Axis {
+    across: AxisTiming {
         // 800 dots: 31.469 kHz, the only line rate of a VGA monitor.
         total: 100,
         // 640 dots, two for each pixel.
@@ -49,7 +49,7 @@ pub(crate) const NEEDED: Timing = Timing {
         // A sync pulse of 96 dots, 3.8 us. It begins 32 dots after the display end.
         retrace: 84..96,
     },
-    down: Axis {
+    down: AxisTiming {
         // Two lines more than 640x480: 59.71 Hz instead of 59.94.
         total: 527,
         // Two for each line of pixels.
@@ -79,7 +79,7 @@ impl Timing {
         let bit = |index: usize, bit: u32, place: u32| (register(index) >> bit & 1) << place;
         let blank = register(0x02);
         let retrace = register(0x04);
-        let across = Axis {
+        let across = AxisTiming {
             total: register(0x00) + 5,
             shown: register(0x01) + 1,
             blank: blank..end(blank, register(0x03) & 0x1F | bit(0x05, 7, 5), 6),
@@ -88,7 +88,7 @@ impl Timing {
         // CR7 has bits 8 and 9 of the vertical positions; CR9 has bit 9 of the blank's start.
         let blank = register(0x15) | bit(0x07, 3, 8) | bit(0x09, 5, 9);
         let retrace = register(0x10) | bit(0x07, 2, 8) | bit(0x07, 7, 9);
-        let down = Axis {
+        let down = AxisTiming {
             total: (register(0x06) | bit(0x07, 0, 8) | bit(0x07, 5, 9)) + 2,
             shown: (register(0x12) | bit(0x07, 1, 8) | bit(0x07, 6, 9)) + 1,
             blank: blank..end(blank, register(0x16), 8),

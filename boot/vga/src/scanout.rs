@@ -1,11 +1,26 @@
 //! The image that the monitor shows.
 
-use crate::Vga;
+use crate::attribute::Attribute;
+use crate::crtc::Crtc;
+use crate::dac::Dac;
 use crate::fault::Complaint;
+use crate::graphics::Graphics;
+use crate::memory::Memory;
+use crate::sequencer::Sequencer;
+
+/// The blocks of the chip that determine the image.
+pub(crate) struct DisplayBlocks<'a> {
+    pub sequencer: &'a Sequencer,
+    pub graphics: &'a Graphics,
+    pub crtc: &'a Crtc,
+    pub attribute: &'a Attribute,
+    pub dac: &'a Dac,
+    pub memory: &'a Memory,
+}
 
 /// The page on the screen, in palette indices, each pixel once.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Page {
+pub struct DisplayedPage {
     /// The start address that the CRTC has latched.
     pub start: u16,
     /// Pixels across.
@@ -22,7 +37,7 @@ pub struct Page {
 
 /// The image on the monitor, a colour for every dot: 640x480 in Mode X, where each pixel is two by two dots.
 #[derive(Clone, PartialEq, Eq)]
-pub struct Frame {
+pub struct MonitorImage {
     /// Dots across.
     pub width: usize,
     /// Scan lines.
@@ -31,8 +46,8 @@ pub struct Frame {
     pub dots: Vec<[u8; 3]>,
 }
 
-impl Page {
-    pub(crate) fn of(card: &Vga) -> Result<Self, Complaint> {
+impl DisplayedPage {
+    pub(crate) fn of(card: &DisplayBlocks) -> Result<Self, Complaint> {
         card.sequencer.check_display()?;
         card.attribute.check_display(card.graphics.is_graphics())?;
         let timing = card.crtc.timing()?;
@@ -41,7 +56,7 @@ impl Page {
         let Some(start) = card.crtc.shown_address() else {
             return Err((
                 "no frame was begun",
-                "the beam never came to a retrace".into(),
+                "the beam has not reached a retrace".into(),
             ));
         };
         let mut pixels = Vec::with_capacity(width * height);
@@ -67,8 +82,8 @@ impl Page {
         })
     }
 
-    /// The image that the monitor shows of this page.
-    pub fn scan_out(&self) -> Frame {
+    /// Returns the monitor's image of this page.
+    pub fn scan_out(&self) -> MonitorImage {
         // A pixel in a 256-colour mode is two dots wide.
         let width = 2 * self.width;
         let height = self.height * self.repeat;
@@ -80,7 +95,7 @@ impl Page {
                     .flat_map(|&pixel| [self.palette[usize::from(pixel)]; 2]),
             );
         }
-        Frame {
+        MonitorImage {
             width,
             height,
             dots,
@@ -88,7 +103,7 @@ impl Page {
     }
 }
 
-impl std::fmt::Debug for Page {
+impl std::fmt::Debug for DisplayedPage {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self {
             width,
@@ -100,7 +115,7 @@ impl std::fmt::Debug for Page {
     }
 }
 
-impl std::fmt::Debug for Frame {
+impl std::fmt::Debug for MonitorImage {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "a frame of {} x {} dots", self.width, self.height)
     }

@@ -12,11 +12,11 @@ use crate::graphics::Graphics;
 use crate::memory::{Memory, PAGE_BYTES, PAGES_END};
 use crate::monitor;
 use crate::ports::*;
-use crate::scanout::{Frame, Page};
+use crate::scanout::{DisplayBlocks, DisplayedPage, MonitorImage};
 use crate::sequencer::Sequencer;
 
 /// Character clocks of each access: 0.95 us, as an 8-bit access on an ISA bus.
-const ACCESS: usize = 3;
+const ACCESS_CLOCKS: usize = 3;
 
 /// The time that passes before an access, in addition to the access's own time, because an interrupt handler
 /// ran or the bus was busy.
@@ -24,19 +24,23 @@ struct Delay(Option<Box<dyn FnMut(Access) -> usize>>);
 
 impl std::fmt::Debug for Delay {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(if self.0.is_some() { "some" } else { "none" })
+        f.write_str(if self.0.is_some() {
+            "Delay(set)"
+        } else {
+            "Delay(not set)"
+        })
     }
 }
 
 /// A VGA in the boot loader's final state: in a linear mode, every VGA register unknown.
 #[derive(Debug)]
 pub struct Vga {
-    pub(crate) sequencer: Sequencer,
-    pub(crate) graphics: Graphics,
-    pub(crate) crtc: Crtc,
-    pub(crate) attribute: Attribute,
-    pub(crate) dac: Dac,
-    pub(crate) memory: Memory,
+    sequencer: Sequencer,
+    graphics: Graphics,
+    crtc: Crtc,
+    attribute: Attribute,
+    dac: Dac,
+    memory: Memory,
     misc: Option<u8>,
     dispi_index: Option<u16>,
     /// Bochs DISPI's linear mode, in which the VGA's registers have no effect.
@@ -52,7 +56,7 @@ pub struct Vga {
 }
 
 impl Vga {
-    /// A VGA in the boot loader's final state.
+    /// Returns a VGA in the boot loader's final state.
     pub fn new() -> Self {
         Self {
             sequencer: Sequencer::default(),
@@ -88,8 +92,8 @@ impl Vga {
         self.log.take().unwrap_or_default()
     }
 
-    /// Port writes with a purpose to a port. On an index port, counts the writes to one register, whether its
-    /// index and data were written together or apart.
+    /// Returns the number of writes with a purpose to a port. On an index port, counts the writes to one
+    /// register, whether its index and data were written together or apart.
     pub fn port_writes(&self, purpose: Purpose, port: u16, index: Option<u8>) -> u64 {
         self.writes
             .get(&(purpose, port, index))
@@ -97,13 +101,13 @@ impl Vga {
             .unwrap_or(0)
     }
 
-    /// Port writes with a purpose.
+    /// Returns the number of port writes with a purpose.
     pub fn all_port_writes(&self, purpose: Purpose) -> u64 {
         let writes = self.writes.iter().filter(|((p, ..), _)| *p == purpose);
         writes.map(|(_, count)| count).sum()
     }
 
-    /// Bytes stored with a purpose.
+    /// Returns the number of bytes stored with a purpose.
     pub fn bytes_stored(&self, purpose: Purpose) -> u64 {
         self.stores.get(&purpose).copied().unwrap_or(0)
     }
@@ -118,8 +122,16 @@ impl Vga {
     /// # Errors
     /// The reason why the screen is blank or garbled. No access is at fault, so the reason is not added to
     /// the list of faults.
-    pub fn page(&self) -> Result<Page, Fault> {
-        Page::of(self).map_err(|(name, state)| Fault {
+    pub fn page(&self) -> Result<DisplayedPage, Fault> {
+        let blocks = DisplayBlocks {
+            sequencer: &self.sequencer,
+            graphics: &self.graphics,
+            crtc: &self.crtc,
+            attribute: &self.attribute,
+            dac: &self.dac,
+            memory: &self.memory,
+        };
+        DisplayedPage::of(&blocks).map_err(|(name, state)| Fault {
             name,
             access: Access::ScanOut,
             state,
@@ -130,13 +142,13 @@ impl Vga {
     ///
     /// # Errors
     /// As [`Vga::page`].
-    pub fn scan_out(&self) -> Result<Frame, Fault> {
+    pub fn scan_out(&self) -> Result<MonitorImage, Fault> {
         Ok(self.page()?.scan_out())
     }
 
     /// Moves the beam until a start address is latched, as on a monitor without any program.
     pub fn finish_frame(&mut self) {
-        match self.crtc.to_take_over() {
+        match self.crtc.clocks_to_latch() {
             Some(clocks) => self.crtc.advance(clocks),
             None => {
                 let complaint = self.crtc.timing().err();
@@ -174,7 +186,7 @@ impl Vga {
     /// Each access has a duration, and has its effect at the end of it.
     fn log(&mut self, access: Access) {
         let delay = self.delay.0.as_mut().map_or(0, |delay| delay(access));
-        self.crtc.advance(ACCESS + delay);
+        self.crtc.advance(ACCESS_CLOCKS + delay);
         if let Some(log) = &mut self.log {
             log.push(access);
         }
@@ -184,7 +196,8 @@ impl Vga {
     fn begin(&mut self, access: Access) {
         self.log(access);
         if self.dispi {
-            let state = "DISPI is enabled: the CRTC is ignored, planes are scrambled".into();
+            let state =
+                "DISPI is enabled: the card ignores the CRTC and scrambles the planes".into();
             self.note(access, Err(("card is in a linear mode", state)));
         }
     }
@@ -250,7 +263,7 @@ impl Vga {
         if self.purpose == Purpose::Setup || !self.sequencer.screen_is_on() {
             return Ok(());
         }
-        let seen = self.crtc.seen();
+        let seen = self.crtc.displayed_starts();
         for (start, what) in seen
             .into_iter()
             .zip(["is on the screen", "will be on the screen"])
@@ -259,7 +272,7 @@ impl Vga {
                 && usize::from(at.wrapping_sub(start)) < PAGE_BYTES
             {
                 return Err((
-                    "store to a page that is seen",
+                    "store to a displayed page",
                     format!("the page at {start:04X} {what}"),
                 ));
             }
@@ -425,7 +438,7 @@ impl Bus for Vga {
 
     fn store64(&mut self, at: u16, bytes: u64) {
         if !at.is_multiple_of(8) {
-            let state = "a wide store is aligned to its eight bytes".into();
+            let state = "a store of eight bytes must be aligned to eight bytes".into();
             self.note(
                 Access::Store(at, bytes as u8),
                 Err(("unaligned store", state)),

@@ -7,7 +7,7 @@ use scene::Pose;
 use vga::Vga;
 
 #[test]
-fn every_frame_is_the_one_drawn_in_ram_and_no_access_is_at_fault() {
+fn every_frame_equals_the_frame_drawn_in_ram_without_a_fault() {
     let mut texels = Box::new([0; scene::TEXELS]);
     let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);

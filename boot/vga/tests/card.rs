@@ -29,13 +29,13 @@ fn the_palette_reads_back_as_it_was_written() {
     assert_eq!(card.palette(), palette());
 }
 
-/// Character clocks that an access takes, of a line, and of a frame.
+/// Character clocks of an access, of a line, and of a frame.
 const ACCESS: usize = 3;
 const LINE: usize = 100;
 const FRAME: usize = 527 * LINE;
 
-/// What Input Status 1 reads, and for how many scan lines, from the first line of a retrace on;
-/// `clock` says where in each line it is read.
+/// Returns the values of Input Status 1 from the first line of a retrace on, each with its number of scan
+/// lines. The register is read at character clock `clock` of each line.
 fn beam(vga: &mut Vga, clock: usize) -> Vec<(u8, usize)> {
     vga.finish_frame();
     vga.pass(clock - ACCESS);
@@ -52,7 +52,7 @@ fn beam(vga: &mut Vga, clock: usize) -> Vec<(u8, usize)> {
 }
 
 #[test]
-fn the_beam_is_where_the_registers_say() {
+fn the_beam_is_where_the_registers_put_it() {
     let retrace = VERTICAL_RETRACE | DISPLAY_DISABLED;
     let frame = |retraces: usize, line: u8| {
         let blank = 37 - retraces;
@@ -80,7 +80,7 @@ fn the_beam_is_where_the_registers_say() {
 }
 
 #[test]
-fn every_access_takes_its_time() {
+fn every_access_lasts_three_character_clocks() {
     let mut vga = striped();
     vga.finish_frame();
     // The retrace is two lines long: 66 accesses of 3 clocks, and the 67th is past its end.
@@ -107,7 +107,7 @@ fn every_access_takes_its_time() {
 }
 
 #[test]
-fn a_start_address_is_taken_over_when_the_latch_says() {
+fn a_start_address_is_latched_at_the_chosen_moment() {
     for (latch, line) in [
         (Latch::DisplayEnd, 480),
         (Latch::RetraceStart, 490),
@@ -192,20 +192,20 @@ fn play(vga: &mut Vga, log: &[Access]) {
 }
 
 #[test]
-fn a_log_played_to_another_card_makes_it_the_same() {
+fn a_log_replayed_on_another_card_gives_the_same_page() {
     let mut vga = Vga::new();
     vga.start_log();
     let mut card = ModeX::set(&mut vga, &palette()).unwrap();
     card.load(0, &mut [0; 8]);
     let log = vga.take_log();
     vga.in8(INPUT_STATUS_1);
-    assert_eq!(vga.take_log(), [], "it was stopped");
-    let mut twin = Vga::new();
-    twin.start_log();
-    play(&mut twin, &log);
-    assert!(twin.take_log() == log);
-    assert_eq!(twin.page().unwrap(), vga.page().unwrap());
-    // Before the planes are cleared no frame has passed: there is nothing to show yet.
+    assert_eq!(vga.take_log(), [], "take_log stops the log");
+    let mut replayed = Vga::new();
+    replayed.start_log();
+    play(&mut replayed, &log);
+    assert!(replayed.take_log() == log);
+    assert_eq!(replayed.page().unwrap(), vga.page().unwrap());
+    // Before the planes are cleared, no frame has passed, so no page is on the screen.
     let loaded = log
         .iter()
         .rposition(|a| matches!(a, Access::Out8(PEL_DATA, _)));

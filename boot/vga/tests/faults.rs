@@ -25,14 +25,14 @@ fn faults(name: &str, access: &str, wrong: impl FnOnce(&mut Vga)) {
     let mut vga = card();
     wrong(&mut vga);
     let faults = vga.take_faults();
-    let told: Vec<_> = faults.iter().map(|fault| fault.to_string()).collect();
-    assert_eq!(faults.len(), 1, "{told:?}");
+    let messages: Vec<_> = faults.iter().map(|fault| fault.to_string()).collect();
+    assert_eq!(faults.len(), 1, "{messages:?}");
     assert_eq!(faults[0].name, name);
-    assert!(told[0].contains(access), "{told:?}");
+    assert!(messages[0].contains(access), "{messages:?}");
 }
 
 #[test]
-fn registers_ports_and_values_that_no_scene_uses() {
+fn registers_ports_and_values_that_no_scene_uses_are_faults() {
     let unused = "unused value";
     faults(unused, "out 3C4h, 0204h", |v| {
         v.out16(SEQUENCER, word(4, 0x02))
@@ -98,7 +98,7 @@ fn registers_ports_and_values_that_no_scene_uses() {
 }
 
 #[test]
-fn what_a_card_drops_or_garbles() {
+fn accesses_that_a_card_drops_or_garbles_are_faults() {
     faults("write to a protected register", "CR00", |v| {
         v.out16(CRTC, word(0, 0x60));
         assert_eq!(v.in8(CRTC + 1), 0x5F);
@@ -130,19 +130,15 @@ fn what_a_card_drops_or_garbles() {
         v.purpose(Purpose::Draw);
         v.lane::<STRIDE>(0xE100, 1, |column| column.fill(|| 1));
     });
-    faults("store to a page that is seen", "is on the screen", |v| {
+    faults("store to a displayed page", "is on the screen", |v| {
         v.purpose(Purpose::Draw);
         v.lane::<STRIDE>(0x4AFF, 1, |column| column.fill(|| 1));
     });
-    faults(
-        "store to a page that is seen",
-        "will be on the screen",
-        |v| {
-            v.out16(CRTC, word(START_ADDRESS_HIGH, 0x4B));
-            v.purpose(Purpose::Erase);
-            v.lane::<STRIDE>(0x4B00, 1, |column| column.fill(|| 1));
-        },
-    );
+    faults("store to a displayed page", "will be on the screen", |v| {
+        v.out16(CRTC, word(START_ADDRESS_HIGH, 0x4B));
+        v.purpose(Purpose::Erase);
+        v.lane::<STRIDE>(0x4B00, 1, |column| column.fill(|| 1));
+    });
     faults(
         "start address is split over a retrace",
         "out 3D4h, 500Dh",
@@ -155,8 +151,8 @@ fn what_a_card_drops_or_garbles() {
 }
 
 #[test]
-fn what_a_fresh_card_does_not_take() {
-    let told = |wrong: &dyn Fn(&mut Vga)| -> Vec<&'static str> {
+fn accesses_before_the_mode_is_set_are_faults() {
+    let names = |wrong: &dyn Fn(&mut Vga)| -> Vec<&'static str> {
         let mut vga = Vga::new();
         wrong(&mut vga);
         vga.take_faults()
@@ -166,7 +162,7 @@ fn what_a_fresh_card_does_not_take() {
     };
     // The linear mode that the boot loader left.
     assert_eq!(
-        told(&|v| v.out8(MISC_WRITE, 0xE3))[0],
+        names(&|v| v.out8(MISC_WRITE, 0xE3))[0],
         "card is in a linear mode"
     );
     let leave = |v: &mut Vga| {
@@ -174,7 +170,7 @@ fn what_a_fresh_card_does_not_take() {
         v.out16(DISPI_DATA, 0);
     };
     let after = |wrong: &dyn Fn(&mut Vga)| {
-        told(&|v| {
+        names(&|v| {
             leave(v);
             wrong(v);
         })
@@ -217,7 +213,7 @@ fn what_a_fresh_card_does_not_take() {
 }
 
 #[test]
-fn a_store_is_told_when_the_window_is_elsewhere() {
+fn a_store_is_a_fault_if_the_window_is_not_at_a0000h() {
     let mut vga = card();
     vga.out16(GRAPHICS, word(6, 0x0D));
     vga.lane::<STRIDE>(0x5000, 1, |column| column.fill(|| 1));
@@ -226,7 +222,7 @@ fn a_store_is_told_when_the_window_is_elsewhere() {
 }
 
 #[test]
-fn what_is_like_a_fault_and_is_none() {
+fn legal_accesses_that_resemble_faults_are_accepted() {
     let mut vga = card();
     // A page that is shown may be set up, and drawn on while the screen is off.
     vga.lane::<STRIDE>(0, 1, |column| column.fill(|| 1));
@@ -247,7 +243,7 @@ fn what_is_like_a_fault_and_is_none() {
 }
 
 #[test]
-fn what_the_monitor_would_not_show() {
+fn a_blank_or_garbled_screen_is_a_fault_of_the_scan_out() {
     let shown = |wrong: &dyn Fn(&mut Vga)| {
         let mut vga = card();
         wrong(&mut vga);
@@ -314,6 +310,6 @@ fn a_load_fills_the_latches_and_a_peek_does_not() {
 
 #[test]
 #[should_panic(expected = "unused port")]
-fn a_fault_that_nobody_took_fails_the_test() {
+fn a_fault_that_no_test_takes_panics_when_the_card_is_dropped() {
     card().out8(0x3C3, 1);
 }

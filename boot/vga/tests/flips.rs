@@ -1,6 +1,5 @@
-//! Flips that cannot tear, at every place of the beam and with any delay: the beam moves with each
-//! access, interrupts come before any of them, and a store to a page that will still be seen is a
-//! fault.
+//! Flips without tearing, at every position of the beam and with any delay. The beam moves with each access,
+//! an interrupt may come before any access, and a store to a page that will still be displayed is a fault.
 
 use std::cell::Cell;
 use std::rc::Rc;
@@ -14,13 +13,14 @@ const LATCHES: [Latch; 3] = [Latch::DisplayEnd, Latch::RetraceStart, Latch::Disp
 /// Character clocks of a line and of a frame.
 const LINE: usize = 100;
 const FRAME: usize = 527 * LINE;
-/// The beam's places that a test begins at: each line, at its begin, in the middle and in the blank.
+/// Returns the positions of the beam at which a test begins: the start, the middle and the blank of each
+/// line.
 fn places() -> impl Iterator<Item = usize> {
     (0..FRAME)
         .step_by(LINE)
         .flat_map(|line| [0, 41, 97].map(|clock| line + clock))
 }
-/// Delays: none, 0.3 ms of a keyboard's handler, the 10 lines between the last line and the retrace,
+/// Delays: zero, 0.3 ms of a keyboard's handler, the 10 lines between the last line and the retrace,
 /// the retrace, the whole blank, most of a frame, and more than one.
 const DELAYS: [usize; 8] = [
     0,
@@ -53,8 +53,8 @@ fn card(latch: Latch, delay: Rc<Cell<usize>>) -> (ModeX<Vga>, Rc<Cell<usize>>) {
     (card, left)
 }
 
-/// Draws the next page, has `flip_and_wait` flip to it with the beam at `place` after the take-over,
-/// and stores to the page that was shown before. Returns what the card finds wrong with that.
+/// Draws the next page, lets `flip_and_wait` flip to it with the beam at `place` after the latch, and stores
+/// to the page that was displayed before. Returns the fault of that store, if it is a fault.
 fn first_store(
     card: &mut ModeX<Vga>,
     place: usize,
@@ -85,7 +85,7 @@ fn display_then_write(card: &mut ModeX<Vga>) {
 }
 
 #[test]
-fn whatever_comes_between_the_accesses_no_page_is_drawn_on_that_is_seen() {
+fn no_displayed_page_is_drawn_on_whatever_interrupts_the_flip() {
     for latch in LATCHES {
         let delay = Rc::new(Cell::new(0));
         let (mut card, left) = card(latch, delay.clone());
@@ -114,9 +114,9 @@ fn whatever_comes_between_the_accesses_no_page_is_drawn_on_that_is_seen() {
     }
 }
 
-/// The test can fail: with the other order it does, just where the driver's comment says.
+/// Shows that the test can fail: it fails with the other order, as the driver's comment says.
 #[test]
-fn the_other_order_tears_when_an_interrupt_comes_before_the_write() {
+fn the_other_order_tears_if_an_interrupt_comes_before_the_write() {
     // The middle of the last line that is shown, as seen from each take-over; the display is seen by
     // access 0, and the write is access 1.
     for (latch, lines) in [(Latch::DisplayEnd, 47), (Latch::RetraceStart, 37)] {
@@ -135,9 +135,8 @@ fn the_other_order_tears_when_an_interrupt_comes_before_the_write() {
     }
 }
 
-/// Pages that are drawn and never shown do not come round to the one that is.
 #[test]
-fn pages_that_are_not_flipped_to_leave_the_shown_one_alone() {
+fn pages_that_are_drawn_and_not_flipped_to_never_reach_the_displayed_page() {
     let mut card = ModeX::set(Vga::new(), &BLACK).unwrap();
     for _ in 0..2 {
         for _ in 0..7 {
@@ -151,7 +150,7 @@ fn pages_that_are_not_flipped_to_leave_the_shown_one_alone() {
 
 /// Frame after frame, drawn by the driver, with an interrupt of any length before one access in a few.
 #[test]
-fn pages_rotate_unseen_whatever_interrupts() {
+fn the_driver_never_draws_on_a_displayed_page_whatever_interrupts() {
     let mut random = seeded::generator();
     for case in 0..seeded::cases(12) {
         let latch = LATCHES[case % 3];

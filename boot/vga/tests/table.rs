@@ -122,9 +122,9 @@ const FREE: [(&str, u8, u8, &str); 2] = [
     ),
 ];
 
-/// How the card takes a mode set with one bit of the table wrong: in the words of a fault, or of what
-/// the monitor shows in place of page 0.
-fn noticed(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String> {
+/// Returns the fault that a mode set with one wrong bit in the table causes, or the page that the monitor
+/// shows instead of page 0.
+fn fault_of(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String> {
     let mut card = Mistaken {
         vga: Vga::new(),
         block,
@@ -157,30 +157,30 @@ fn noticed(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String>
 }
 
 #[test]
-fn no_bit_of_the_table_can_be_wrong() {
-    let mut silent = Vec::new();
+fn every_wrong_bit_of_the_register_table_is_a_fault() {
+    let mut unexpected = Vec::new();
     for (block, registers) in MODE_X.blocks() {
         for (index, &right) in (0..).zip(registers) {
             for bit in (0..8).map(|bit| 1 << bit) {
                 let free = FREE
                     .iter()
                     .any(|&(b, i, bits, _)| (b, i) == (block, index) && bits & bit != 0);
-                let words = noticed(block, index, right, bit);
-                if words.is_none() != free {
-                    silent.push(format!("{block} {index:02X} bit {bit:02X}: {words:?}"));
+                let fault = fault_of(block, index, right, bit);
+                if fault.is_none() != free {
+                    unexpected.push(format!("{block} {index:02X} bit {bit:02X}: {fault:?}"));
                 }
             }
         }
     }
-    assert!(silent.is_empty(), "{silent:#?}");
-    // And with no bit wrong nobody says a word.
-    assert_eq!(noticed("misc", 0, MODE_X.misc, 0), None);
+    assert!(unexpected.is_empty(), "{unexpected:#?}");
+    // Without a wrong bit there is no fault.
+    assert_eq!(fault_of("misc", 0, MODE_X.misc, 0), None);
 }
 
-/// The words say which registers, and by how much.
+/// The fault names the registers, the required time and the given time.
 #[test]
-fn a_wrong_time_is_named_with_what_is_needed() {
-    for (index, bit, words) in [
+fn a_wrong_time_is_reported_with_the_required_time() {
+    for (index, bit, expected) in [
         (
             0x00,
             0x01,
@@ -224,11 +224,11 @@ fn a_wrong_time_is_named_with_what_is_needed() {
         (
             0x17,
             0x80,
-            "CR17 = 63h: bits 80h are to be 80h: the syncs are on",
+            "CR17 = 63h: bits 80h must be 80h: the syncs are on",
         ),
     ] {
         let right = MODE_X.crtc[usize::from(index)];
-        let said = noticed("crtc", index, right, bit).unwrap_or_default();
-        assert!(said.contains(words), "{words}: {said}");
+        let fault = fault_of("crtc", index, right, bit).unwrap_or_default();
+        assert!(fault.contains(expected), "{expected}: {fault}");
     }
 }

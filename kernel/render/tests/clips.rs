@@ -2,7 +2,7 @@
 //! Failures that a sweep of solids finds are pasted in here.
 
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
-use oracle::solid::{Checker, Compared, Count, Mix, Solid, length, pose};
+use oracle::solid::{PixelCounter, Solid, SolidChecker, SolidCounts, SolidMix, length, pose};
 use render::{RenderMemory, RenderOptions};
 use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Vec3};
 
@@ -37,10 +37,10 @@ fn at_every_distance_nothing_is_dropped() {
 }
 
 /// Runs `cases` cases of a mix; panics with a test to paste.
-fn sweep(mix: Mix, cases: usize) -> Compared {
+fn sweep(mix: SolidMix, cases: usize) -> SolidCounts {
     let seed = seeded::generator().get_seed();
-    let mut checker = Checker::default();
-    let mut compared = Compared::default();
+    let mut checker = SolidChecker::default();
+    let mut compared = SolidCounts::default();
     for number in 0..seeded::cases(cases) as u64 {
         let case = mix.case(seed, number);
         compared += checker.case(&case).unwrap_or_else(|wrong| {
@@ -54,22 +54,22 @@ fn sweep(mix: Mix, cases: usize) -> Compared {
 
 #[test]
 fn from_inside_a_box_each_pixel_is_written_once() {
-    sweep(Mix::InBox, 3000);
+    sweep(SolidMix::InBox, 3000);
 }
 
 #[test]
 fn from_inside_the_ball_each_pixel_is_written_once() {
-    sweep(Mix::InBall, 1000);
+    sweep(SolidMix::InBall, 1000);
 }
 
 #[test]
 fn from_inside_a_crag_each_pixel_is_written_once() {
-    sweep(Mix::InCrag, 3000);
+    sweep(SolidMix::InCrag, 3000);
 }
 
 #[test]
 fn closed_solids_have_no_gap_from_outside_and_no_double_but_in_a_fold() {
-    for mix in [Mix::Ball, Mix::Cube, Mix::Octahedron] {
+    for mix in [SolidMix::Ball, SolidMix::Cube, SolidMix::Octahedron] {
         let compared = sweep(mix, 300);
         assert!(!seeded::is_whole() || compared.pixels > 200_000);
         // One in some ten thousand poses has a fold with a pixel.
@@ -79,12 +79,12 @@ fn closed_solids_have_no_gap_from_outside_and_no_double_but_in_a_fold() {
 
 #[test]
 fn cut_faces_are_where_lines_of_sight_meet_them() {
-    let Compared {
+    let SolidCounts {
         cut: [near, guard],
         cut_away,
         changed,
         ..
-    } = sweep(Mix::Anywhere, 400);
+    } = sweep(SolidMix::Anywhere, 400);
     assert!(
         !seeded::is_whole() || near > 400 && guard > 200 && cut_away > 200_000 && changed > 400
     );
@@ -95,7 +95,7 @@ fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
     let mut storage = in_place::boxed!(RenderMemory);
     let unit = 1 << 16;
     let cube = Solid::cuboid([unit; 3]);
-    let mut count = Count::default();
+    let mut count = PixelCounter::default();
     let mut looking_on = |above: i32, roll: u32| {
         let pose = Pose {
             yaw: 0,
@@ -120,7 +120,7 @@ fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
 fn beyond_the_limits_all_is_dropped_and_counted() {
     let mut storage = in_place::boxed!(RenderMemory);
     let cube = Solid::cuboid([1 << 16; 3]);
-    let mut count = Count::default();
+    let mut count = PixelCounter::default();
     for (distance, dropped) in [
         (-1, 6),
         (i32::MIN, 6),
@@ -166,7 +166,7 @@ fn a_zigzag_that_clipping_gives_too_many_corners_is_dropped_and_counted() {
             roll: 0,
             distance: 0,
         };
-        let stats = Count::default().draw(&mut storage, &solid, &straight);
+        let stats = PixelCounter::default().draw(&mut storage, &solid, &straight);
         assert_eq!(stats.dropped, dropped, "{corners} corners");
     }
 }

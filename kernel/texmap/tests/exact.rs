@@ -1,7 +1,7 @@
 //! Checks the exact mapper against its definition, in integers twice as wide; and its quantised plane against
 //! the exact plane. Failures that a sweep of texels finds are pasted in here.
 
-use oracle::plane::{Checker, Compared, FOCAL_LENGTH, Mix, anchor};
+use oracle::plane::{FOCAL_LENGTH, PlaneChecker, PlaneCounts, PlaneMix, anchor};
 use oracle::texel::forms;
 use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING};
 
@@ -11,8 +11,8 @@ const CASES: u64 = 1500;
 #[test]
 fn every_texel_is_the_floor_of_the_quotient() {
     let seed = seeded::generator().get_seed();
-    let mut checker = Checker::default();
-    for mix in Mix::ALL {
+    let mut checker = PlaneChecker::default();
+    for mix in PlaneMix::ALL {
         let (mut samples, mut clamped, mut ties) = (0, 0, 0);
         for number in 0..CASES {
             let case = mix.case(seed, number);
@@ -22,7 +22,7 @@ fn every_texel_is_the_floor_of_the_quotient() {
                 let from = format_args!("mix {mix:?}, seed {seed}, case {number}");
                 panic!("\n{}", small.source(&wrong, from));
             });
-            let Compared {
+            let PlaneCounts {
                 samples: more,
                 clamped: outside,
                 ties: whole,
@@ -37,9 +37,11 @@ fn every_texel_is_the_floor_of_the_quotient() {
         );
         let (seen, clamps) = (samples - clamped > samples / 20, clamped > samples / 20);
         match mix {
-            Mix::Ties => assert!(ties > samples / 40 && seen && clamps),
-            Mix::Deep | Mix::Near | Mix::Nearest | Mix::AcrossEye => assert!(seen && clamps),
-            Mix::ThroughEye | Mix::BehindEye => assert!(clamps),
+            PlaneMix::Ties => assert!(ties > samples / 40 && seen && clamps),
+            PlaneMix::Deep | PlaneMix::Near | PlaneMix::Nearest | PlaneMix::AcrossEye => {
+                assert!(seen && clamps)
+            }
+            PlaneMix::ThroughEye | PlaneMix::BehindEye => assert!(clamps),
         }
     }
 }

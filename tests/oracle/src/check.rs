@@ -1,4 +1,4 @@
-//! Checks the renderer's scans against the oracle.
+//! Checks the renderer's column and row scans against the oracle.
 
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,7 +10,7 @@ use crate::coverage::{Area, Pixels, Row};
 
 /// A case of a sweep.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Case {
+pub struct CoverageCase {
     /// The polygons. Each is checked separately.
     pub polygons: Vec<Vec<Point>>,
     /// If present, the polygons fill this outline: each pixel inside belongs to exactly one of them, and no
@@ -29,7 +29,7 @@ pub enum Scan {
 
 /// A reason why a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Wrong {
+pub enum CoverageError {
     /// The polygon was dropped.
     Dropped(Scan, Dropped),
     /// The renderer panicked (an overflow, for example).
@@ -56,14 +56,14 @@ pub enum Wrong {
     Gap(i32, i32),
 }
 
-impl fmt::Display for Wrong {
+impl fmt::Display for CoverageError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = |scan: &Scan| match scan {
             Scan::Columns => "the column scan",
             Scan::Rows => "the row scan",
         };
         match self {
-            Self::Dropped(scan, why) => write!(f, "{} dropped it: {why:?}", name(scan)),
+            Self::Dropped(scan, why) => write!(f, "{} dropped the polygon: {why:?}", name(scan)),
             Self::Panicked => write!(f, "a scan panicked"),
             Self::Misplaced(scan, run) => {
                 let Run {
@@ -71,26 +71,35 @@ impl fmt::Display for Wrong {
                 } = run;
                 write!(
                     f,
-                    "{} gave a run out of place: line {line}, {len} from {first}",
+                    "{} gave a misplaced span: line {line}, {len} pixels from {first}",
                     name(scan)
                 )
             }
             Self::Pixel { scan, x, y, inside } => {
-                let is = if *inside { "inside" } else { "outside" };
-                write!(f, "({x}, {y}) is {is}, and not so by {}", name(scan))
+                let (expected, found) = match inside {
+                    true => ("inside", "outside"),
+                    false => ("outside", "inside"),
+                };
+                write!(f, "({x}, {y}) is {expected}, but {found} by {}", name(scan))
             }
-            Self::Spans(axis) => write!(f, "the spans are not the runs, {axis:?}"),
+            Self::Spans(axis) => write!(
+                f,
+                "{axis:?}: the spans without crossings differ from the spans with crossings"
+            ),
             Self::Twice(x, y) => write!(f, "({x}, {y}) belongs to two polygons"),
-            Self::Gap(x, y) => write!(f, "({x}, {y}) is not as in the outline"),
+            Self::Gap(x, y) => write!(
+                f,
+                "({x}, {y}) is in the outline or in a polygon, but not in both"
+            ),
         }
     }
 }
 
-impl std::error::Error for Wrong {}
+impl std::error::Error for CoverageError {}
 
-/// Checks cases, and owns the memory for that.
+/// Checks cases, and owns the memory for the checks.
 #[derive(Debug, Default)]
-pub struct Checker {
+pub struct CoverageChecker {
     oracle: Pixels,
     scanned: Pixels,
     union: Pixels,
@@ -98,18 +107,18 @@ pub struct Checker {
     runs: Vec<(u16, u16, u16)>,
 }
 
-impl Checker {
+impl CoverageChecker {
     /// Checks a case, and returns the number of compared pixels: for each polygon, all pixels of the screen
     /// that meet its bounding box, and the pixels around them.
     ///
     /// # Errors
     /// The first error found.
-    pub fn case(&mut self, case: &Case) -> Result<u64, Wrong> {
+    pub fn case(&mut self, case: &CoverageCase) -> Result<u64, CoverageError> {
         let Some(outline) = &case.outline else {
             return case.polygons.iter().map(|p| self.polygon(p)).sum();
         };
-        let whole = Area::around(outline);
-        self.union.clear(&whole);
+        let outline_area = Area::around(outline);
+        self.union.clear(&outline_area);
         let mut pixels = 0;
         for polygon in &case.polygons {
             pixels += self.polygon(polygon)?;
@@ -118,17 +127,17 @@ impl Checker {
                 let (union, row) = (self.union.row_mut(y), self.oracle.row(y));
                 let both = std::array::from_fn(|i| union[i] & row[i]);
                 if let Some(x) = first(&both) {
-                    return Err(Wrong::Twice(x, y));
+                    return Err(CoverageError::Twice(x, y));
                 }
                 for (all, word) in union.iter_mut().zip(row) {
                     *all |= word;
                 }
             }
         }
-        self.oracle.cover(outline, &whole);
-        match difference(&self.oracle, &self.union, &whole) {
-            Some((x, y)) => Err(Wrong::Gap(x, y)),
-            None => Ok(pixels + whole.pixels()),
+        self.oracle.cover(outline, &outline_area);
+        match difference(&self.oracle, &self.union, &outline_area) {
+            Some((x, y)) => Err(CoverageError::Gap(x, y)),
+            None => Ok(pixels + outline_area.pixels()),
         }
     }
 
@@ -136,17 +145,17 @@ impl Checker {
     ///
     /// # Errors
     /// The first error found.
-    pub fn polygon(&mut self, polygon: &[Point]) -> Result<u64, Wrong> {
+    pub fn polygon(&mut self, polygon: &[Point]) -> Result<u64, CoverageError> {
         debug_assert!(polygon.len() <= MAX_SIDES);
         let area = Area::around(polygon);
         self.oracle.cover(polygon, &area);
         for scan in [Scan::Columns, Scan::Rows] {
             // A panic counts as a failure, so that the case is shrunk and printed.
             catch_unwind(AssertUnwindSafe(|| self.scan(polygon, &area, scan)))
-                .unwrap_or(Err(Wrong::Panicked))?;
+                .unwrap_or(Err(CoverageError::Panicked))?;
             if let Some((x, y)) = difference(&self.oracle, &self.scanned, &area) {
                 let inside = self.oracle.contains(x, y);
-                return Err(Wrong::Pixel { scan, x, y, inside });
+                return Err(CoverageError::Pixel { scan, x, y, inside });
             }
         }
         for axis in [Axis::Down, Axis::Right] {
@@ -156,7 +165,7 @@ impl Checker {
     }
 
     /// Compares the spans without crossings to the spans with crossings.
-    fn spans(&mut self, polygon: &[Point], axis: Axis) -> Result<(), Wrong> {
+    fn spans(&mut self, polygon: &[Point], axis: Axis) -> Result<(), CoverageError> {
         let mut runs = std::mem::take(&mut self.runs);
         runs.clear();
         let with = runs_of(axis, polygon, |run| {
@@ -172,12 +181,12 @@ impl Checker {
         if same {
             Ok(())
         } else {
-            Err(Wrong::Spans(axis))
+            Err(CoverageError::Spans(axis))
         }
     }
 
     /// Fills `scanned` with one of the renderer's scans.
-    fn scan(&mut self, polygon: &[Point], area: &Area, scan: Scan) -> Result<(), Wrong> {
+    fn scan(&mut self, polygon: &[Point], area: &Area, scan: Scan) -> Result<(), CoverageError> {
         let scanned = &mut self.scanned;
         scanned.clear(area);
         let (lines, cells) = match scan {
@@ -192,7 +201,7 @@ impl Checker {
             let end = first + i32::from(run.len);
             let placed = lines.contains(&line) && cells.start <= first && end <= cells.end;
             if !placed || first == end || (line, first) < free {
-                wrong.get_or_insert(Wrong::Misplaced(scan, run));
+                wrong.get_or_insert(CoverageError::Misplaced(scan, run));
                 return;
             }
             free = (line, end);
@@ -215,7 +224,7 @@ impl Checker {
             Scan::Columns => columns(polygon, sink),
             Scan::Rows => rows(polygon, sink),
         }
-        .map_err(|why| Wrong::Dropped(scan, why))?;
+        .map_err(|why| CoverageError::Dropped(scan, why))?;
         if scan == Scan::Columns {
             let mut above = Row::default();
             for y in area.y.clone() {

@@ -15,18 +15,18 @@ use scene::{FOCAL_LENGTH, Pose, Vec3};
 use texmap::{Face, Point};
 
 use crate::coverage::{Area, Pixels};
-use crate::solid::{Count, Solid};
+use crate::solid::{PixelCounter, Solid};
 use crate::texel::{cross, dot};
 
 /// The inverse depth (1/z) of a plane at a pixel, except for a factor that all planes share: a quotient whose
 /// divisor is above zero.
 #[derive(Clone, Copy, Debug)]
-struct Nearness {
+struct InverseDepth {
     n: i128,
     d: i128,
 }
 
-impl Nearness {
+impl InverseDepth {
     /// The inverse depth of a plane through three points within 2^24: n is below 2^63 and d below 2^78.
     fn new(anchors: &[Vec3; 3], x: i32, y: i32) -> Self {
         let [a, b, c] = anchors.map(|point| point.map(i128::from));
@@ -67,7 +67,7 @@ impl Nearness {
 
 /// Counts of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Compared {
+pub struct DepthCounts {
     /// Pixels that a face covers.
     pub pixels: u64,
     /// Pixels that more than one face covers.
@@ -87,13 +87,13 @@ pub fn check(
     solid: &Solid,
     pose: &Pose,
     options: RenderOptions,
-) -> Result<Compared, String> {
-    let mut count = Count::default();
+) -> Result<DepthCounts, String> {
+    let mut count = PixelCounter::default();
     solid.on_stage(storage, |stage| {
         let nearest = sorted(stage, pose);
         let posed = stage.at(pose);
         let visible = posed.visible().expect("the solid is not convex");
-        let mut compared = Compared::default();
+        let mut compared = DepthCounts::default();
         let mut found = Vec::new();
         for i in 0..WIDTH * HEIGHT {
             let (x, y) = (i % WIDTH, i / WIDTH);
@@ -107,11 +107,13 @@ pub fn check(
             if expected == found {
                 continue;
             }
-            let near = |&(number, nearness): &(u16, Nearness)| {
-                Some(number) == found && nearness.is_close_to(&seen[0].1)
+            let near = |&(number, inverse_depth): &(u16, InverseDepth)| {
+                Some(number) == found && inverse_depth.is_close_to(&seen[0].1)
             };
             if !seen.iter().any(near) {
-                return Err(format!("({x}, {y}) shows {found:?}, not {expected:?}"));
+                return Err(format!(
+                    "({x}, {y}) shows face {found:?}, but the nearest face is {expected:?}"
+                ));
             }
             compared.ties += 1;
         }
@@ -121,14 +123,17 @@ pub fn check(
         let stats = count.redraw(stage, pose, options);
         if u64::from(stats.pixels) != compared.pixels {
             return Err(format!(
-                "{} pixels were written of {}",
+                "{} pixels were written, but faces cover {}",
                 stats.pixels, compared.pixels
             ));
         }
         for (i, &found) in found.iter().enumerate() {
             let (x, y, times) = (i % WIDTH, i / WIDTH, count.times(i));
             if times != u8::from(found.is_some()) {
-                return Err(format!("({x}, {y}) is written {times} times"));
+                return Err(format!(
+                    "({x}, {y}) is written {times} times, not {}",
+                    u8::from(found.is_some())
+                ));
             }
         }
         Ok(compared)
@@ -137,12 +142,12 @@ pub fn check(
 
 /// The numbers of the front faces that cover each pixel, the nearest first.
 pub fn nearest(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<u16>> {
-    let numbers = |faces: Vec<(u16, Nearness)>| faces.into_iter().map(|face| face.0).collect();
+    let numbers = |faces: Vec<(u16, InverseDepth)>| faces.into_iter().map(|face| face.0).collect();
     sorted(stage, pose).into_iter().map(numbers).collect()
 }
 
 /// The faces that cover each pixel, the nearest first.
-fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)>> {
+fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, InverseDepth)>> {
     let mut at = vec![Vec::new(); WIDTH * HEIGHT];
     let mut covered = Pixels::default();
     stage.at(pose).faces(|number, face| {
@@ -158,8 +163,8 @@ fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, Nearness)
         covered.cover(&polygon, &area);
         for y in area.y {
             for x in area.x.clone().filter(|&x| covered.contains(x, y)) {
-                let nearness = Nearness::new(&anchors, x, y);
-                at[y as usize * WIDTH + x as usize].push((number, nearness));
+                let inverse_depth = InverseDepth::new(&anchors, x, y);
+                at[y as usize * WIDTH + x as usize].push((number, inverse_depth));
             }
         }
     });

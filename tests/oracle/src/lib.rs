@@ -1,5 +1,15 @@
 //! The renderer's required results, from the definitions, and the sweeps that compare the renderer with them.
 //!
+//! ```
+//! use oracle::coverage::inside;
+//! use texmap::Point;
+//!
+//! // The square from (0, 0) to (2, 2); coordinates are in 1/256 pixel.
+//! let square = [(0, 0), (512, 0), (512, 512), (0, 512)].map(|(x, y)| Point { x, y });
+//! assert!(inside(&square, 1, 1));
+//! assert!(!inside(&square, 2, 1));
+//! ```
+//!
 //! If the renderer were on both sides of a comparison, its bugs would cancel. So [`coverage`], [`texel`] and
 //! [`sight`] share no code with the renderer, except for the plain types of points and faces, and are written
 //! to be read beside the definitions.

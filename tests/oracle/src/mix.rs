@@ -6,12 +6,12 @@
 use fastrand::Rng;
 use texmap::{MAX_COORDINATE, Point};
 
-use crate::check::Case;
+use crate::check::CoverageCase;
 use crate::coverage::{HEIGHT, WIDTH};
 
 /// A kind of polygon. Every case has the property that the kind's name states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mix {
+pub enum PolygonMix {
     /// All vertices on pixel centres.
     Centres,
     /// All vertices on pixel edges, or on pixel corners.
@@ -44,7 +44,7 @@ pub enum Mix {
     Meshes,
 }
 
-impl Mix {
+impl PolygonMix {
     /// All mixes.
     pub const ALL: [Self; 15] = [
         Self::Centres,
@@ -86,8 +86,8 @@ impl Mix {
     }
 
     /// Case `number` of this mix.
-    pub fn case(self, seed: u64, number: u64) -> Case {
-        let mut draw = Draw {
+    pub fn case(self, seed: u64, number: u64) -> CoverageCase {
+        let mut draw = PolygonGenerator {
             random: stream(seed, self as u64, number),
         };
         let polygon = match self {
@@ -98,16 +98,16 @@ impl Mix {
             Self::Flat => draw.flat(),
             Self::Repeated => draw.repeated(),
             Self::Collinear => draw.collinear(),
-            Self::Crossing => draw.until(|p| !is_convex(p), Draw::anything),
+            Self::Crossing => draw.until(|p| !is_convex(p), PolygonGenerator::anything),
             Self::Clockwise => draw.wound(1),
             Self::Anticlockwise => draw.wound(-1),
             Self::Outside => draw.outside(),
-            Self::Far => draw.until(is_far, Draw::far),
+            Self::Far => draw.until(is_far, PolygonGenerator::far),
             Self::Tiny => draw.tiny(),
             Self::Fans => return draw.fan(),
             Self::Meshes => return draw.mesh(),
         };
-        Case {
+        CoverageCase {
             polygons: vec![polygon],
             outline: None,
         }
@@ -166,11 +166,11 @@ fn half(d: Point) -> bool {
     d.y < 0 || d.y == 0 && d.x < 0
 }
 
-struct Draw {
+struct PolygonGenerator {
     random: Rng,
 }
 
-impl Draw {
+impl PolygonGenerator {
     fn until(&mut self, good: fn(&[Point]) -> bool, draw: fn(&mut Self) -> Polygon) -> Polygon {
         loop {
             let polygon = draw(self);
@@ -429,7 +429,7 @@ impl Draw {
 
     /// All triangles turn the same way, and once around in total: so none overlap, and together they are the
     /// ring.
-    fn fan(&mut self) -> Case {
+    fn fan(&mut self) -> CoverageCase {
         let grid = self.grid();
         let off = self.random.choice([0, 128]).unwrap();
         let count = self.random.usize(4..=12);
@@ -447,7 +447,7 @@ impl Draw {
             triangle.rotate_left(self.random.usize(..3));
             triangle
         });
-        Case {
+        CoverageCase {
             polygons: triangles.collect(),
             outline: Some(ring),
         }
@@ -455,7 +455,7 @@ impl Draw {
 
     /// A lattice whose points move by at most a quarter of its spacing. That turns no triangle over, so none
     /// overlap, and together they fill the border.
-    fn mesh(&mut self) -> Case {
+    fn mesh(&mut self) -> CoverageCase {
         let spacing = self
             .random
             .choice([1, 4, 16, 64, 128, 256, 512, 1024])
@@ -493,7 +493,7 @@ impl Draw {
         let right = (0..rows).map(|row| at(columns, row));
         let bottom = (1..=columns).rev().map(|column| at(column, rows));
         let left = (1..=rows).rev().map(|row| at(0, row));
-        Case {
+        CoverageCase {
             polygons,
             outline: Some(top.chain(right).chain(bottom).chain(left).collect()),
         }

@@ -22,7 +22,7 @@ const COLUMNS: usize = 8;
 
 /// A kind of plane. Every case has the property that the kind's name states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mix {
+pub enum PlaneMix {
     /// From the near plane to 256 units, in one polygon.
     Deep,
     /// Within a unit of the eye.
@@ -39,7 +39,7 @@ pub enum Mix {
     BehindEye,
 }
 
-impl Mix {
+impl PlaneMix {
     /// All mixes.
     pub const ALL: [Self; 7] = [
         Self::Deep,
@@ -65,7 +65,7 @@ impl Mix {
     }
 
     /// Case `number` of this mix.
-    pub fn case(self, seed: u64, number: u64) -> Case {
+    pub fn case(self, seed: u64, number: u64) -> PlaneCase {
         let mut random = stream(seed, 32 + self as u64, number);
         let random = &mut random;
         let size = (side(random), side(random));
@@ -96,7 +96,7 @@ impl Mix {
             let (x, y) = (random.u16(0..320), random.u16(0..240));
             (x, y, random.u16(1..=240 - y))
         });
-        Case {
+        PlaneCase {
             anchors,
             size,
             columns: columns.to_vec(),
@@ -147,7 +147,7 @@ fn facing(random: &mut Rng, (w, h): (u16, u16)) -> [Anchor; 3] {
 
 /// A case: a plane, a texture's size, and columns of the screen as x, y, length.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Case {
+pub struct PlaneCase {
     /// The plane.
     pub anchors: [Anchor; 3],
     /// Texels across and down.
@@ -156,9 +156,9 @@ pub struct Case {
     pub columns: Vec<(u16, u16, u16)>,
 }
 
-impl Case {
+impl PlaneCase {
     /// Reduces a failing case to its first failing column.
-    pub fn shrink(&self, checker: &mut Checker) -> Self {
+    pub fn shrink(&self, checker: &mut PlaneChecker) -> Self {
         let alone = self.columns.iter().map(|&column| Self {
             columns: vec![column],
             ..self.clone()
@@ -169,7 +169,7 @@ impl Case {
 
     /// The source of a test with the case, for `kernel/texmap/tests/exact.rs`; `from` says where it was
     /// found.
-    pub fn source(&self, wrong: &Wrong, from: impl fmt::Display) -> String {
+    pub fn source(&self, wrong: &PlaneError, from: impl fmt::Display) -> String {
         let Self {
             anchors,
             size,
@@ -178,17 +178,17 @@ impl Case {
         let [a, b, c] = anchors;
         format!(
             "/// {wrong}. Found by {from}.\n#[test]\nfn found_by_a_sweep() {{\n    \
-             use oracle::plane::{{Case, Checker}};\n    \
-             let case = Case {{\n        anchors: [\n            {a:?},\n            {b:?},\n            \
+             use oracle::plane::{{PlaneCase, PlaneChecker}};\n    \
+             let case = PlaneCase {{\n        anchors: [\n            {a:?},\n            {b:?},\n            \
              {c:?},\n        ],\n        size: {size:?},\n        columns: vec!{columns:?},\n    }};\n    \
-             assert_eq!(Checker::default().case(&case).err(), None);\n}}\n"
+             assert_eq!(PlaneChecker::default().case(&case).err(), None);\n}}\n"
         )
     }
 }
 
 /// A reason why a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Wrong {
+pub enum PlaneError {
     /// The mapper panicked.
     Panicked,
     /// A quantised form is further than [`ROUNDING`] from the exact form.
@@ -208,11 +208,11 @@ pub enum Wrong {
     },
 }
 
-impl fmt::Display for Wrong {
+impl fmt::Display for PlaneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Panicked => write!(f, "the mapper panicked"),
-            Self::Cut => write!(f, "cutting the plane moved a form by more than its bound"),
+            Self::Cut => write!(f, "quantisation moved a form by more than its bound"),
             Self::Texel {
                 x,
                 y,
@@ -223,18 +223,18 @@ impl fmt::Display for Wrong {
                 let axis = if *down { "down" } else { "across" };
                 write!(
                     f,
-                    "({x}, {y}) reads texel {found} {axis}, and the floor is {expected}"
+                    "({x}, {y}) reads texel {found} {axis}, but the quotient's floor is {expected}"
                 )
             }
         }
     }
 }
 
-impl std::error::Error for Wrong {}
+impl std::error::Error for PlaneError {}
 
 /// Counts of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Compared {
+pub struct PlaneCounts {
     /// Pixels, each with both of its coordinates.
     pub samples: u64,
     /// Coordinates outside the texture.
@@ -243,16 +243,16 @@ pub struct Compared {
     pub ties: u64,
 }
 
-/// Checks cases, and owns the memory for that.
+/// Checks cases, and owns the memory for the checks.
 #[derive(Debug)]
-pub struct Checker {
+pub struct PlaneChecker {
     page: Box<PlanarBuffer>,
     /// By width: texels that contain their column's number, and texels that contain their row's, 256 rows of
     /// each.
     axes: Vec<[Vec<u8>; 2]>,
 }
 
-impl Default for Checker {
+impl Default for PlaneChecker {
     fn default() -> Self {
         Self {
             page: Box::new(PlanarBuffer::new()),
@@ -261,22 +261,22 @@ impl Default for Checker {
     }
 }
 
-impl Checker {
+impl PlaneChecker {
     /// Checks a case, and returns the counts of the comparison.
     ///
     /// # Errors
     /// The first error found.
-    pub fn case(&mut self, case: &Case) -> Result<Compared, Wrong> {
+    pub fn case(&mut self, case: &PlaneCase) -> Result<PlaneCounts, PlaneError> {
         // A panic counts as a failure, so that the case is printed.
-        catch_unwind(AssertUnwindSafe(|| self.columns(case))).unwrap_or(Err(Wrong::Panicked))
+        catch_unwind(AssertUnwindSafe(|| self.columns(case))).unwrap_or(Err(PlaneError::Panicked))
     }
 
-    fn columns(&mut self, case: &Case) -> Result<Compared, Wrong> {
+    fn columns(&mut self, case: &PlaneCase) -> Result<PlaneCounts, PlaneError> {
         let plane = Plane::new(&case.anchors, FOCAL_LENGTH);
         if !is_cut_by_one_shift(case, &plane) {
-            return Err(Wrong::Cut);
+            return Err(PlaneError::Cut);
         }
-        let mut compared = Compared::default();
+        let mut compared = PlaneCounts::default();
         for &column in &case.columns {
             let more = self.column(case, &plane, column)?;
             compared.samples += more.samples;
@@ -288,10 +288,10 @@ impl Checker {
 
     fn column(
         &mut self,
-        case: &Case,
+        case: &PlaneCase,
         plane: &Plane,
         (x, y, len): (u16, u16, u16),
-    ) -> Result<Compared, Wrong> {
+    ) -> Result<PlaneCounts, PlaneError> {
         let (w, h) = case.size;
         let axes = &mut self.axes[usize::from(w)];
         if axes[0].is_empty() {
@@ -315,7 +315,7 @@ impl Checker {
                 let expected = perspective(n, c, size);
                 let found = self.page.pixel(x.into(), y.into()).into();
                 if expected != found {
-                    return Err(Wrong::Texel {
+                    return Err(PlaneError::Texel {
                         x,
                         y,
                         down,
@@ -329,7 +329,7 @@ impl Checker {
             }
         }
         let marks = &marks[..len.into()];
-        Ok(Compared {
+        Ok(PlaneCounts {
             samples: len.into(),
             clamped: marks.iter().filter(|mark| mark.0).count() as u64,
             ties: marks.iter().filter(|mark| mark.1).count() as u64,
@@ -345,7 +345,7 @@ fn at(form: &Form, x: u16, y: u16) -> i128 {
 
 /// Whether a single shift turns the exact forms into the plane's forms, within [`ROUNDING`], at the upper end
 /// of the first column and at the lower end of the last.
-fn is_cut_by_one_shift(case: &Case, plane: &Plane) -> bool {
+fn is_cut_by_one_shift(case: &PlaneCase, plane: &Plane) -> bool {
     let upper = case.columns.first().map(|&(x, y, _)| (x, y));
     let lower = case.columns.last().map(|&(x, y, len)| (x, y + len - 1));
     let pixels = upper.into_iter().chain(lower).map(|(x, y)| {

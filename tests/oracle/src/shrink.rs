@@ -4,11 +4,11 @@ use std::fmt::{Display, Write};
 
 use texmap::{MAX_COORDINATE, Point};
 
-use crate::check::{Case, Checker, Wrong};
+use crate::check::{CoverageCase, CoverageChecker, CoverageError};
 
 /// Shrinks a failing case, usually to a single polygon that is as simple as it can be and still fail. If only
 /// the whole case fails, the case stays as it is.
-pub fn shrink(checker: &mut Checker, case: &Case) -> Case {
+pub fn shrink(checker: &mut CoverageChecker, case: &CoverageCase) -> CoverageCase {
     let Some(failing) = case.polygons.iter().find(|p| checker.polygon(p).is_err()) else {
         return case.clone();
     };
@@ -19,7 +19,7 @@ pub fn shrink(checker: &mut Checker, case: &Case) -> Case {
     {
         polygon = simpler;
     }
-    Case {
+    CoverageCase {
         polygons: vec![polygon],
         outline: None,
     }
@@ -87,14 +87,14 @@ fn cost(polygon: &[Point]) -> (usize, u32, i64) {
 }
 
 /// The source of a test with the case, for `tests/oracle/tests/coverage.rs`; `from` says where it was found.
-pub fn source(case: &Case, wrong: &Wrong, from: impl Display) -> String {
+pub fn source(case: &CoverageCase, wrong: &CoverageError, from: impl Display) -> String {
     let points = |polygon: &[Point]| {
         let point = |p: &Point| format!("({}, {})", p.x, p.y);
         let points: Vec<_> = polygon.iter().map(point).collect();
         format!("polygon(&[{}])", points.join(", "))
     };
     let mut text = format!("/// {wrong}. Found by {from}.\n#[test]\nfn found_by_a_sweep() {{\n");
-    text += "    let case = Case {\n        polygons: vec![\n";
+    text += "    let case = CoverageCase {\n        polygons: vec![\n";
     for polygon in &case.polygons {
         let _ = writeln!(text, "            {},", points(polygon));
     }
@@ -103,7 +103,7 @@ pub fn source(case: &Case, wrong: &Wrong, from: impl Display) -> String {
     let _ = write!(
         text,
         "        ],\n        outline: {outline},\n    }};\n    \
-         assert_eq!(Checker::default().case(&case).err(), None);\n}}\n"
+         assert_eq!(CoverageChecker::default().case(&case).err(), None);\n}}\n"
     );
     text
 }

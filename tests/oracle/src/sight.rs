@@ -12,14 +12,14 @@ use crate::texel::{cross, dot};
 
 /// A linear form on the screen, above zero on its inner side.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Form {
+struct RayForm {
     /// Coefficients for the direction of twice the ray, so that they are integers.
     across: [i128; 3],
     /// The part that does not depend on the ray.
     constant: i128,
 }
 
-impl Form {
+impl RayForm {
     fn at(&self, x: i32, y: i32) -> i128 {
         let ray = [
             2 * x - (WIDTH as i32 - 1),
@@ -57,15 +57,15 @@ impl Form {
 
 /// A flat convex face in front of the eye or beside it, or one that the near plane cuts.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Face {
-    edges: Vec<Form>,
-    near: Form,
+pub struct ViewFace {
+    edges: Vec<RayForm>,
+    near: RayForm,
     /// The volume of the pyramid from the eye to the face, times a constant: above zero if the face looks at
     /// the eye.
     volume: i128,
 }
 
-impl Face {
+impl ViewFace {
     /// The face with these corners in view space, each coordinate within 2^24: a determinant is below 2^61, a
     /// volume below 2^75.
     pub fn new(corners: &[Vec3]) -> Self {
@@ -77,14 +77,14 @@ impl Face {
         let volume = dot(wide(0), normal);
         // A face seen from behind is walked the other way round.
         let sign = if volume < 0 { -1 } else { 1 };
-        let edge = |normal: &[i128; 3]| Form {
+        let edge = |normal: &[i128; 3]| RayForm {
             across: normal.map(|k| sign * k),
             constant: 0,
         };
         Self {
             edges: normals.iter().map(edge).collect(),
             // The ray meets the plane at z = volume / (normal . ray) times the ray's z.
-            near: Form {
+            near: RayForm {
                 across: normal.map(|k| -sign * i128::from(NEAR) * k),
                 constant: sign * volume * i128::from(2 * FOCAL_LENGTH),
             },
@@ -100,7 +100,7 @@ impl Face {
     /// Whether moving the corners by `by` may turn the face over, because it is nearly edge-on: compares the
     /// volume with its largest change, to first order.
     pub fn is_edge_on(&self, by: f64) -> bool {
-        let length = |edge: &Form| {
+        let length = |edge: &RayForm| {
             let [x, y, z] = edge.across.map(|k| k as f64);
             x.hypot(y).hypot(z)
         };
@@ -128,7 +128,8 @@ impl Face {
     pub fn is_beside_screen(&self) -> bool {
         let (right, bottom) = (WIDTH as i32 - 1, HEIGHT as i32 - 1);
         let corners = [(0, 0), (right, 0), (0, bottom), (right, bottom)];
-        let beside = |form: &Form, most: i128| corners.iter().all(|&(x, y)| form.at(x, y) <= most);
+        let beside =
+            |form: &RayForm, most: i128| corners.iter().all(|&(x, y)| form.at(x, y) <= most);
         self.edges.iter().any(|edge| beside(edge, 0)) || beside(&self.near, -1)
     }
 }

@@ -210,12 +210,12 @@ impl Solid {
 
 /// Counts how often each pixel was written, and owns a page to write to.
 #[derive(Debug)]
-pub struct Count {
+pub struct PixelCounter {
     times: Vec<u8>,
     page: Box<PlanarBuffer>,
 }
 
-impl Default for Count {
+impl Default for PixelCounter {
     fn default() -> Self {
         Self {
             times: vec![0; WIDTH * HEIGHT],
@@ -224,7 +224,7 @@ impl Default for Count {
     }
 }
 
-impl Count {
+impl PixelCounter {
     /// The number of pixels never written, and of pixels written more than once.
     pub fn gaps_and_doubles(&self) -> (usize, usize) {
         let count = |wrong: fn(u8) -> bool| self.times.iter().filter(|&&n| wrong(n)).count();
@@ -262,7 +262,7 @@ impl Count {
     }
 }
 
-impl Destination for Count {
+impl Destination for PixelCounter {
     fn select(&mut self, _: u16) {}
 
     fn lane<const STEP: usize>(
@@ -311,7 +311,7 @@ pub enum Eye {
 
 /// A case: a solid, its pose and the eye's place.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Case {
+pub struct SolidCase {
     /// The solid.
     pub shape: Shape,
     /// The solid's pose.
@@ -320,7 +320,7 @@ pub struct Case {
     pub eye: Eye,
 }
 
-impl Case {
+impl SolidCase {
     fn solid(&self) -> Solid {
         match &self.shape {
             Shape::Ball(lengths) => Solid::ball().stretched(lengths),
@@ -330,7 +330,7 @@ impl Case {
     }
 
     /// The source of a test with the case, for `kernel/scene/tests/clips.rs`; `from` says where it was found.
-    pub fn source(&self, wrong: &Wrong, from: impl fmt::Display) -> String {
+    pub fn source(&self, wrong: &SolidError, from: impl fmt::Display) -> String {
         let Self { shape, pose, eye } = self;
         let shape = match shape {
             Shape::Ball(lengths) => format!("Ball(vec!{lengths:?})"),
@@ -339,17 +339,17 @@ impl Case {
         };
         format!(
             "/// {wrong}. Found by {from}.\n#[test]\nfn found_by_a_sweep() {{\n    \
-             use oracle::solid::{{Case, Checker, Eye, Shape}};\n    \
-             let case = Case {{\n        shape: Shape::{shape},\n        pose: {pose:?},\n        \
+             use oracle::solid::{{SolidCase, SolidChecker, Eye, Shape}};\n    \
+             let case = SolidCase {{\n        shape: Shape::{shape},\n        pose: {pose:?},\n        \
              eye: Eye::{eye:?},\n    }};\n    \
-             assert_eq!(Checker::default().case(&case).err(), None);\n}}\n"
+             assert_eq!(SolidChecker::default().case(&case).err(), None);\n}}\n"
         )
     }
 }
 
 /// A kind of solid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mix {
+pub enum SolidMix {
     /// The ball from outside, with a radius from a twentieth of a pixel upward.
     Ball,
     /// A cube from outside.
@@ -367,7 +367,7 @@ pub enum Mix {
     Anywhere,
 }
 
-impl Mix {
+impl SolidMix {
     /// All mixes.
     pub const ALL: [Self; 7] = [
         Self::Ball,
@@ -393,7 +393,7 @@ impl Mix {
     }
 
     /// Case `number` of this mix.
-    pub fn case(self, seed: u64, number: u64) -> Case {
+    pub fn case(self, seed: u64, number: u64) -> SolidCase {
         let mut random = stream(seed, 64 + self as u64, number);
         let random = &mut random;
         match self {
@@ -404,7 +404,7 @@ impl Mix {
             Self::InBall => {
                 // The ball's faces are nowhere nearer than 0.98 to its centre.
                 let distance = random.i32(0..UNIT / 100 * 97);
-                Case {
+                SolidCase {
                     shape: Shape::Ball(vec![UNIT]),
                     pose: pose(random, distance),
                     eye: Eye::Inside,
@@ -420,7 +420,7 @@ impl Mix {
                         _ => random.i32(-most..=most),
                     }
                 });
-                Case {
+                SolidCase {
                     shape: Shape::Cuboid(half, eye),
                     pose: pose(random, 0),
                     eye: Eye::Inside,
@@ -434,7 +434,7 @@ impl Mix {
                 } else {
                     Shape::Octahedron((0..6).map(|_| length(random)).collect())
                 };
-                Case {
+                SolidCase {
                     shape,
                     pose: pose(random, 0),
                     eye: Eye::Inside,
@@ -449,7 +449,7 @@ impl Mix {
                 let lengths = (0..6).map(|_| any()).collect();
                 let distance = any();
                 let distance = random.choice([0, distance]).unwrap_or(0);
-                Case {
+                SolidCase {
                     shape: Shape::Octahedron(lengths),
                     pose: pose(random, distance),
                     eye: Eye::Anywhere,
@@ -459,7 +459,7 @@ impl Mix {
     }
 }
 
-fn from_outside(random: &mut Rng, reach: i32, shape: impl Fn(i32) -> Shape) -> Case {
+fn from_outside(random: &mut Rng, reach: i32, shape: impl Fn(i32) -> Shape) -> SolidCase {
     let shift = random.choice([0, 3, 6]).unwrap_or(0);
     let distance = if random.u8(0..8) == 0 {
         // With room for the rounding of the turn.
@@ -468,7 +468,7 @@ fn from_outside(random: &mut Rng, reach: i32, shape: impl Fn(i32) -> Shape) -> C
         let bits = random.u32(17..23);
         random.i32(1 << bits..=(2 << bits).min(Pose::MAX_DISTANCE))
     };
-    Case {
+    SolidCase {
         shape: shape(UNIT >> shift),
         pose: pose(random, distance),
         eye: Eye::Outside,
@@ -501,7 +501,7 @@ pub fn length(random: &mut Rng) -> i32 {
 
 /// A reason why a case fails.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Wrong {
+pub enum SolidError {
     /// Drawing it panicked.
     Panicked,
     /// This many faces were dropped.
@@ -515,30 +515,30 @@ pub enum Wrong {
     Sight(i32, i32, Vec<Vec3>, u32),
 }
 
-impl fmt::Display for Wrong {
+impl fmt::Display for SolidError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Panicked => write!(f, "drawing it panicked"),
+            Self::Panicked => write!(f, "the renderer panicked"),
             Self::Dropped(faces) => write!(f, "{faces} faces were dropped"),
-            Self::Times(x, y, times) => write!(f, "({x}, {y}) was written {times} times"),
-            Self::Sides(x, y) => write!(f, "front and back differ at ({x}, {y})"),
+            Self::Times(x, y, times) => write!(f, "({x}, {y}) was written {times} times, not once"),
+            Self::Sides(x, y) => write!(f, "front and back did not write ({x}, {y}) equally often"),
             Self::Sight(x, y, corners, off) => {
                 let (pixels, rest) = (off / 1000, off % 1000);
                 write!(
                     f,
-                    "({x}, {y}), {pixels}.{rest:03} pixel from an edge, is not as its line of sight to \
-                     {corners:?} says"
+                    "({x}, {y}), {pixels}.{rest:03} pixel from an edge, is drawn unlike its line of sight to \
+                     the face {corners:?}"
                 )
             }
         }
     }
 }
 
-impl std::error::Error for Wrong {}
+impl std::error::Error for SolidError {}
 
 /// Counts of the comparison.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Compared {
+pub struct SolidCounts {
     /// Faces drawn, or compared.
     pub faces: u64,
     /// Pixels compared.
@@ -555,7 +555,7 @@ pub struct Compared {
     pub furthest: f64,
 }
 
-impl std::ops::AddAssign for Compared {
+impl std::ops::AddAssign for SolidCounts {
     fn add_assign(&mut self, more: Self) {
         self.faces += more.faces;
         self.pixels += more.pixels;
@@ -570,32 +570,32 @@ impl std::ops::AddAssign for Compared {
 /// Largest distance from a true edge at which a pixel may lie on the other side.
 const SNAPPED: f64 = 1.0 / 128.0;
 
-/// Checks cases, and owns the memory for that.
+/// Checks cases, and owns the memory for the checks.
 #[derive(Debug)]
-pub struct Checker {
+pub struct SolidChecker {
     storage: InPlace<RenderMemory>,
-    front: Count,
-    back: Count,
+    front: PixelCounter,
+    back: PixelCounter,
     covered: Pixels,
 }
 
-impl Default for Checker {
+impl Default for SolidChecker {
     fn default() -> Self {
         Self {
             storage: in_place::boxed!(RenderMemory),
-            front: Count::default(),
-            back: Count::default(),
+            front: PixelCounter::default(),
+            back: PixelCounter::default(),
             covered: Pixels::default(),
         }
     }
 }
 
-impl Checker {
+impl SolidChecker {
     /// Checks a case, and returns the counts of the comparison.
     ///
     /// # Errors
     /// The first error found.
-    pub fn case(&mut self, case: &Case) -> Result<Compared, Wrong> {
+    pub fn case(&mut self, case: &SolidCase) -> Result<SolidCounts, SolidError> {
         let (solid, pose) = (case.solid(), &case.pose);
         // A panic counts as a failure, so that the case is printed.
         let check = AssertUnwindSafe(|| match case.eye {
@@ -607,23 +607,23 @@ impl Checker {
                 Ok(compared)
             }
         });
-        catch_unwind(check).unwrap_or(Err(Wrong::Panicked))
+        catch_unwind(check).unwrap_or(Err(SolidError::Panicked))
     }
 
-    fn seen_from_inside(&mut self, solid: &Solid, pose: &Pose) -> Result<Compared, Wrong> {
+    fn seen_from_inside(&mut self, solid: &Solid, pose: &Pose) -> Result<SolidCounts, SolidError> {
         let stats = self.front.draw(&mut self.storage, solid, pose);
         none_dropped(stats)?;
         match self.front.first(|_, times| times != 1) {
-            Some((x, y, times)) => Err(Wrong::Times(x, y, times)),
-            None => Ok(Compared {
+            Some((x, y, times)) => Err(SolidError::Times(x, y, times)),
+            None => Ok(SolidCounts {
                 faces: stats.polygons.into(),
                 pixels: (WIDTH * HEIGHT) as u64,
-                ..Compared::default()
+                ..SolidCounts::default()
             }),
         }
     }
 
-    fn seen_from_outside(&mut self, solid: &Solid, pose: &Pose) -> Result<Compared, Wrong> {
+    fn seen_from_outside(&mut self, solid: &Solid, pose: &Pose) -> Result<SolidCounts, SolidError> {
         let turned = solid.clone().inside_out();
         let fronts = self.front.draw(&mut self.storage, solid, pose);
         let backs = self.back.draw(&mut self.storage, &turned, pose);
@@ -631,7 +631,7 @@ impl Checker {
         none_dropped(backs)?;
         let back = &self.back.times;
         if let Some((x, y, _)) = self.front.first(|i, times| times != back[i]) {
-            return Err(Wrong::Sides(x, y));
+            return Err(SolidError::Sides(x, y));
         }
         let mut folds = 0;
         if let Some((x, y, times)) = self.front.first(|i, times| {
@@ -643,13 +643,13 @@ impl Checker {
             folds += u64::from(fold);
             times > 1 && !fold
         }) {
-            return Err(Wrong::Times(x, y, times));
+            return Err(SolidError::Times(x, y, times));
         }
-        Ok(Compared {
+        Ok(SolidCounts {
             faces: (fronts.polygons + backs.polygons).into(),
             pixels: self.front.times.iter().filter(|&&times| times > 0).count() as u64,
             folds,
-            ..Compared::default()
+            ..SolidCounts::default()
         })
     }
 
@@ -657,7 +657,7 @@ impl Checker {
     ///
     /// # Errors
     /// The first error found.
-    pub fn by_sight(&mut self, solid: &Solid, pose: &Pose) -> Result<Compared, Wrong> {
+    pub fn by_sight(&mut self, solid: &Solid, pose: &Pose) -> Result<SolidCounts, SolidError> {
         let mut drawn = Vec::new();
         let mut dropped = 0;
         solid.on_stage(&mut self.storage, |stage| {
@@ -673,24 +673,31 @@ impl Checker {
             });
         });
         if dropped > 0 {
-            return Err(Wrong::Dropped(dropped));
+            return Err(SolidError::Dropped(dropped));
         }
         let mut drawn = drawn.into_iter().peekable();
-        let mut compared = Compared::default();
+        let mut compared = SolidCounts::default();
         for corners in solid.views(pose) {
             let polygon = drawn.next_if(|(positions, _)| *positions == anchors(&corners));
             let polygon = polygon.map(|(_, polygon)| polygon);
             compared += self.face(&corners, polygon.as_deref())?;
         }
-        assert!(drawn.next().is_none(), "a face that the solid has not");
+        assert!(
+            drawn.next().is_none(),
+            "a drawn face is not a face of the solid"
+        );
         Ok(compared)
     }
 
-    fn face(&mut self, corners: &[Vec3], polygon: Option<&[Point]>) -> Result<Compared, Wrong> {
-        let face = sight::Face::new(corners);
-        let mut compared = Compared {
+    fn face(
+        &mut self,
+        corners: &[Vec3],
+        polygon: Option<&[Point]>,
+    ) -> Result<SolidCounts, SolidError> {
+        let face = sight::ViewFace::new(corners);
+        let mut compared = SolidCounts {
             faces: 1,
-            ..Compared::default()
+            ..SolidCounts::default()
         };
         let area = match polygon {
             Some(polygon) => Area::around(polygon),
@@ -718,7 +725,7 @@ impl Checker {
                 let distance = face.distance(x, y);
                 if distance > SNAPPED {
                     let off = (distance * 1000.0) as u32;
-                    return Err(Wrong::Sight(x, y, corners.to_vec(), off));
+                    return Err(SolidError::Sight(x, y, corners.to_vec(), off));
                 }
                 compared.changed += 1;
                 compared.furthest = compared.furthest.max(distance);
@@ -739,10 +746,10 @@ fn anchors(corners: &[Vec3]) -> [Vec3; 3] {
     [0, 1, 2].map(|i| corners[i * corners.len() / 3])
 }
 
-fn none_dropped(stats: Stats) -> Result<(), Wrong> {
+fn none_dropped(stats: Stats) -> Result<(), SolidError> {
     match stats.dropped {
         0 => Ok(()),
-        faces => Err(Wrong::Dropped(faces)),
+        faces => Err(SolidError::Dropped(faces)),
     }
 }
 
@@ -767,6 +774,6 @@ fn is_in_fold(storage: &mut RenderMemory, solid: &Solid, pose: &Pose, x: i32, y:
         let z = corners.iter().map(|corner| corner[2]).max();
         let snapped = f64::from(z.unwrap_or(0)) / f64::from(512 * FOCAL_LENGTH);
         let by = ROUNDED + snapped * std::f64::consts::SQRT_2;
-        covering.contains(&anchors(&corners)) && sight::Face::new(&corners).is_edge_on(by)
+        covering.contains(&anchors(&corners)) && sight::ViewFace::new(&corners).is_edge_on(by)
     })
 }

@@ -3,8 +3,8 @@
 
 use std::fmt::Display;
 
-use oracle::check::{Case, Checker};
-use oracle::mix::Mix;
+use oracle::check::{CoverageCase, CoverageChecker};
+use oracle::mix::PolygonMix;
 use oracle::shrink::{shrink, source};
 use oracle::small_world::{STEPS, TRIANGLES, triangle};
 use texmap::coverage::{self, Dropped};
@@ -18,7 +18,7 @@ fn polygon(points: &[(i32, i32)]) -> Vec<Point> {
 }
 
 /// Returns the number of compared pixels; panics with a test to paste.
-fn check(checker: &mut Checker, case: &Case, from: impl Display) -> u64 {
+fn check(checker: &mut CoverageChecker, case: &CoverageCase, from: impl Display) -> u64 {
     checker.case(case).unwrap_or_else(|_| {
         let small = shrink(checker, case);
         let wrong = checker.case(&small).expect_err("shrinking keeps a failure");
@@ -27,9 +27,9 @@ fn check(checker: &mut Checker, case: &Case, from: impl Display) -> u64 {
 }
 
 /// Checks [`CASES`] of each of the mixes.
-fn check_mixes(mixes: impl Iterator<Item = Mix>) {
+fn check_mixes(mixes: impl Iterator<Item = PolygonMix>) {
     let seed = seeded::generator().get_seed();
-    let mut checker = Checker::default();
+    let mut checker = CoverageChecker::default();
     for mix in mixes {
         let mut pixels = 0;
         for number in 0..seeded::cases(CASES) as u64 {
@@ -42,23 +42,23 @@ fn check_mixes(mixes: impl Iterator<Item = Mix>) {
 
 // Two tests, so that two cores share the work.
 #[test]
-fn columns_and_rows_cover_what_the_oracle_says_in_every_even_mix() {
-    check_mixes(Mix::ALL.into_iter().step_by(2));
+fn column_and_row_scans_agree_with_the_oracle_in_every_even_mix() {
+    check_mixes(PolygonMix::ALL.into_iter().step_by(2));
 }
 
 #[test]
-fn columns_and_rows_cover_what_the_oracle_says_in_every_odd_mix() {
-    check_mixes(Mix::ALL.into_iter().skip(1).step_by(2));
+fn column_and_row_scans_agree_with_the_oracle_in_every_odd_mix() {
+    check_mixes(PolygonMix::ALL.into_iter().skip(1).step_by(2));
 }
 
 #[test]
-fn a_part_of_the_small_world_is_covered_as_the_oracle_says() {
+fn scans_agree_with_the_oracle_on_a_part_of_the_small_world() {
     let mut random = seeded::generator();
-    let mut checker = Checker::default();
+    let mut checker = CoverageChecker::default();
     for step in STEPS {
         for _ in 0..seeded::cases(TRIANGLES as usize / 50) {
             let number = random.u32(..TRIANGLES);
-            let case = Case {
+            let case = CoverageCase {
                 polygons: vec![triangle(step, number).to_vec()],
                 outline: None,
             };
@@ -72,9 +72,9 @@ fn a_part_of_the_small_world_is_covered_as_the_oracle_says() {
 }
 
 #[test]
-fn the_far_corners_of_the_range_are_covered_as_the_oracle_says() {
+fn scans_agree_with_the_oracle_at_the_limits_of_the_coordinates() {
     let m = MAX_COORDINATE;
-    let mut checker = Checker::default();
+    let mut checker = CoverageChecker::default();
     for points in [
         [(-m, -m), (m, m), (-m, m)],
         [(-m, m), (m, -m), (m, m)],
@@ -82,7 +82,7 @@ fn the_far_corners_of_the_range_are_covered_as_the_oracle_says() {
         [(-m, 128), (m, 128), (m, 129)],
         [(128, -m), (128, m), (129, m)],
     ] {
-        let case = Case {
+        let case = CoverageCase {
             polygons: vec![polygon(&points)],
             outline: None,
         };
@@ -91,11 +91,11 @@ fn the_far_corners_of_the_range_are_covered_as_the_oracle_says() {
 }
 
 #[test]
-fn beyond_the_range_a_polygon_is_dropped_and_gives_no_run() {
+fn a_polygon_beyond_the_limits_is_dropped_and_gives_no_span() {
     let m = MAX_COORDINATE;
     let shifted = |x: i32, y: i32| polygon(&[(m + x, m + y), (0, 0), (-m - x, 256 - y)]);
     let with_sides = |n: usize| polygon(&[(0, 0), (0, 256), (256, 0)].repeat(6)[..n]);
-    let mut checker = Checker::default();
+    let mut checker = CoverageChecker::default();
     for polygon in [shifted(0, 0), with_sides(MAX_SIDES)] {
         assert!(checker.polygon(&polygon).is_ok());
     }

@@ -3,7 +3,7 @@
 use num_bigint::BigInt;
 use num_rational::BigRational;
 use oracle::coverage::{Area, HEIGHT, Pixels, WIDTH, inside};
-use oracle::mix::Mix;
+use oracle::mix::PolygonMix;
 use texmap::{MAX_COORDINATE, Point};
 
 /// Cases for the big numbers.
@@ -45,7 +45,7 @@ fn the_oracle_agrees_with_big_rationals() {
     let seed = random.get_seed();
     let (mut tied, mut far, mut yes) = (0, 0, 0);
     for number in 0..seeded::cases(CASES) {
-        let mix = Mix::ALL[number % Mix::ALL.len()];
+        let mix = PolygonMix::ALL[number % PolygonMix::ALL.len()];
         let mut case = mix.case(seed, number as u64);
         let mut polygon = case.polygons.swap_remove(0);
         // Every eighth polygon has its vertices at the limit or just inside.
@@ -82,10 +82,10 @@ fn the_oracle_agrees_with_big_rationals() {
 }
 
 #[test]
-fn a_set_has_the_pixels_that_are_inside_one_by_one() {
+fn the_set_of_a_polygon_contains_exactly_the_pixels_inside() {
     let seed = seeded::generator().get_seed();
     let mut pixels = Pixels::default();
-    for mix in Mix::ALL {
+    for mix in PolygonMix::ALL {
         for number in 0..seeded::cases(40) as u64 {
             for polygon in mix.case(seed, number).polygons {
                 let area = Area::around(&polygon);

@@ -1,7 +1,7 @@
 //! Checks that each mix has the property that its name states. Whether the mixes find errors shows when a
 //! scan is wrong.
 
-use oracle::mix::Mix;
+use oracle::mix::PolygonMix;
 use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
 
 fn area(a: Point, b: Point, c: Point) -> i64 {
@@ -22,7 +22,7 @@ fn is_on_screen(p: &Point) -> bool {
     (0..320 * 256).contains(&p.x) && (0..240 * 256).contains(&p.y)
 }
 
-fn keeps_its_promise(mix: Mix, p: &[Point]) -> bool {
+fn has_named_property(mix: PolygonMix, p: &[Point]) -> bool {
     let n = p.len();
     let corner = |i: usize| [p[i], p[(i + 1) % n], p[(i + 2) % n]];
     let turns = (0..n).map(|i| {
@@ -30,47 +30,49 @@ fn keeps_its_promise(mix: Mix, p: &[Point]) -> bool {
         area(a, b, c)
     });
     match mix {
-        Mix::Centres => p.iter().all(|p| p.x & 255 == 128 && p.y & 255 == 128),
-        Mix::Borders => p.iter().all(|p| p.x & 255 == 0 || p.y & 255 == 0),
-        Mix::Straight => p.windows(2).all(|side| {
+        PolygonMix::Centres => p.iter().all(|p| p.x & 255 == 128 && p.y & 255 == 128),
+        PolygonMix::Borders => p.iter().all(|p| p.x & 255 == 0 || p.y & 255 == 0),
+        PolygonMix::Straight => p.windows(2).all(|side| {
             let (dx, dy) = (side[1].x - side[0].x, side[1].y - side[0].y);
             dx == 0 || dy == 0 || dx.abs() == dy.abs()
         }),
         // All within 2/256 of the line through the two points that are furthest apart.
-        Mix::Slivers => {
+        PolygonMix::Slivers => {
             let length = |a: Point, b: Point| i64::from((b.x - a.x).abs().max((b.y - a.y).abs()));
             let pairs = p.iter().flat_map(|&a| p.iter().map(move |&b| (a, b)));
             let (a, b) = pairs.max_by_key(|&(a, b)| length(a, b)).unwrap();
             p.iter().all(|&c| area(a, b, c).abs() <= 4 * length(a, b))
         }
-        Mix::Flat => p.iter().all(|&c| p.iter().all(|&b| area(p[0], b, c) == 0)),
-        Mix::Repeated => p.iter().enumerate().any(|(i, a)| p[..i].contains(a)),
-        Mix::Collinear => turns.clone().any(|turn| turn == 0),
-        Mix::Crossing => turns.clone().any(|turn| turn > 0) && turns.clone().any(|turn| turn < 0),
-        Mix::Clockwise => signed_area(p) > 0,
-        Mix::Anticlockwise => signed_area(p) < 0,
-        Mix::Outside => p.iter().any(is_on_screen) && !p.iter().all(is_on_screen),
-        Mix::Far => p.iter().any(|p| p.x.abs().max(p.y.abs()) > 10_000 * 256),
-        Mix::Tiny => extent(p.iter().map(|p| p.x)).max(extent(p.iter().map(|p| p.y))) < 256,
-        Mix::Fans => n == 3,
-        Mix::Meshes => n <= 4,
+        PolygonMix::Flat => p.iter().all(|&c| p.iter().all(|&b| area(p[0], b, c) == 0)),
+        PolygonMix::Repeated => p.iter().enumerate().any(|(i, a)| p[..i].contains(a)),
+        PolygonMix::Collinear => turns.clone().any(|turn| turn == 0),
+        PolygonMix::Crossing => {
+            turns.clone().any(|turn| turn > 0) && turns.clone().any(|turn| turn < 0)
+        }
+        PolygonMix::Clockwise => signed_area(p) > 0,
+        PolygonMix::Anticlockwise => signed_area(p) < 0,
+        PolygonMix::Outside => p.iter().any(is_on_screen) && !p.iter().all(is_on_screen),
+        PolygonMix::Far => p.iter().any(|p| p.x.abs().max(p.y.abs()) > 10_000 * 256),
+        PolygonMix::Tiny => extent(p.iter().map(|p| p.x)).max(extent(p.iter().map(|p| p.y))) < 256,
+        PolygonMix::Fans => n == 3,
+        PolygonMix::Meshes => n <= 4,
     }
 }
 
 #[test]
-fn every_mix_is_what_its_name_says_and_legal() {
+fn every_polygon_of_a_mix_is_legal_and_has_the_property_in_its_name() {
     let seed = seeded::generator().get_seed();
-    for mix in Mix::ALL {
+    for mix in PolygonMix::ALL {
         let mut sides = [false; MAX_SIDES];
         for number in 0..seeded::cases(5000) as u64 {
             let case = mix.case(seed, number);
             for polygon in &case.polygons {
                 sides[polygon.len()] = true;
                 let legal = |p: &Point| p.x.abs().max(p.y.abs()) <= MAX_COORDINATE;
-                let good = polygon.iter().all(legal) && keeps_its_promise(mix, polygon);
+                let good = polygon.iter().all(legal) && has_named_property(mix, polygon);
                 assert!(good, "{mix:?} {number}: {polygon:?}");
             }
-            let many = matches!(mix, Mix::Fans | Mix::Meshes);
+            let many = matches!(mix, PolygonMix::Fans | PolygonMix::Meshes);
             assert_eq!(case.outline.is_some(), many, "{mix:?} {number}");
             if let Some(outline) = &case.outline {
                 // The areas add up: the polygons fill the outline, and none is turned over.
@@ -80,9 +82,11 @@ fn every_mix_is_what_its_name_says_and_legal() {
         }
         match mix {
             _ if !seeded::is_whole() => {}
-            Mix::Fans | Mix::Meshes => {}
+            PolygonMix::Fans | PolygonMix::Meshes => {}
             // A triangle is convex, and a triangle with a vertex in a side has four vertices.
-            Mix::Crossing | Mix::Collinear => assert!(sides[4..=8].iter().all(|&seen| seen)),
+            PolygonMix::Crossing | PolygonMix::Collinear => {
+                assert!(sides[4..=8].iter().all(|&seen| seen))
+            }
             _ => assert!(sides[3..=8].iter().all(|&seen| seen), "{mix:?}"),
         }
     }

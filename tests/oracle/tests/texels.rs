@@ -16,11 +16,11 @@ fn by_weights(triangle: &[Vertex; 3], x: i32, y: i32) -> Option<([BigInt; 2], Bi
     let area = |p: &[BigInt; 2], q: &[BigInt; 2], r: &[BigInt; 2]| {
         (&q[0] - &p[0]) * (&r[1] - &p[1]) - (&r[0] - &p[0]) * (&q[1] - &p[1])
     };
-    let whole = area(&corners[0], &corners[1], &corners[2]);
+    let total = area(&corners[0], &corners[1], &corners[2]);
     let weights = [0, 1, 2].map(|i| area(&centre, &corners[(i + 1) % 3], &corners[(i + 2) % 3]));
-    // A weight has the sign of the whole if the centre is on the inner side of that edge.
-    let outside = |weight: &BigInt| weight * &whole < BigInt::ZERO;
-    if whole == BigInt::ZERO || weights.iter().any(outside) {
+    // A weight has the sign of the total if the centre is on the inner side of that edge.
+    let outside = |weight: &BigInt| weight * &total < BigInt::ZERO;
+    if total == BigInt::ZERO || weights.iter().any(outside) {
         return None;
     }
     let sum = |of: fn(&Vertex) -> i32| -> BigInt {
@@ -30,11 +30,11 @@ fn by_weights(triangle: &[Vertex; 3], x: i32, y: i32) -> Option<([BigInt; 2], Bi
             .map(|(weight, at)| weight * of(at))
             .sum()
     };
-    Some(([sum(|at| at.u), sum(|at| at.v)], whole))
+    Some(([sum(|at| at.u), sum(|at| at.v)], total))
 }
 
 #[test]
-fn affine_coordinates_are_those_of_big_rationals() {
+fn affine_coordinates_equal_those_in_big_rationals() {
     let mut random = seeded::generator();
     let (mut compared, mut case) = (0, 0);
     while compared < seeded::cases(100_000) {
@@ -73,7 +73,7 @@ fn affine_coordinates_are_those_of_big_rationals() {
 }
 
 #[test]
-fn a_slack_reaches_the_neighbour_and_the_last_texel_owns_its_border() {
+fn an_error_reaches_the_neighbouring_texel_and_the_last_texel_owns_its_border() {
     let at = |n: i128| Coordinate { n: 3 * n, d: 3 };
     assert_eq!(at(5 << 16).texels(16, 8), 4..=5);
     assert_eq!(at((5 << 16) + 1000).texels(7, 8), 5..=5);

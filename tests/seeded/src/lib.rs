@@ -9,6 +9,14 @@
 //! | `CRYSTAL_BALL_CASES` | no test tries more cases than this, if its number of cases may vary ([`cases`]) |
 //! | `CRYSTAL_BALL_SEEDED` | a file to which each test that requests a generator adds a line with its name |
 //!
+//! ```
+//! let mut random = seeded::generator();
+//! for _ in 0..seeded::cases(100) {
+//!     let number = random.u32(..1000);
+//!     assert_eq!((number * number) / number.max(1), number);
+//! }
+//! ```
+//!
 //! `cargo soak` repeats the random tests of the whole workspace.
 #![forbid(unsafe_code)]
 
@@ -51,7 +59,8 @@ pub fn generator() -> Rng {
     Rng::with_seed(seed)
 }
 
-/// Returns how many cases a random test tries: `usual`, or fewer if [`CASES`] says so, but at least 1.
+/// Returns how many cases a random test tries: `usual`, or the value of [`CASES`] if that is smaller, but at
+/// least 1.
 ///
 /// # Panics
 /// If [`CASES`] is set, but not to a number.
@@ -65,9 +74,9 @@ pub fn is_whole() -> bool {
     env::var_os(CASES).is_none()
 }
 
-fn limit(usual: usize, most: Option<u64>) -> usize {
-    let most = most.map(|most| usize::try_from(most).unwrap_or(usize::MAX));
-    most.map_or(usual, |most| usual.min(most.max(1)))
+fn limit(usual: usize, max: Option<u64>) -> usize {
+    let max = max.map(|max| usize::try_from(max).unwrap_or(usize::MAX));
+    max.map_or(usual, |max| usual.min(max.max(1)))
 }
 
 fn number(variable: &str) -> Option<u64> {
@@ -111,7 +120,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cases_are_limited_from_above_and_there_is_one_at_least() {
+    fn the_number_of_cases_is_limited_and_at_least_one() {
         assert_eq!(limit(100, None), 100);
         assert_eq!(limit(100, Some(20)), 20);
         assert_eq!(limit(100, Some(1000)), 100);

@@ -25,7 +25,7 @@ struct Arguments {
     /// Stop after this many rounds
     #[arg(long, value_name = "N")]
     rounds: Option<u64>,
-    /// Most cases of a test, in place of its own number: more rounds, fewer cases in each
+    /// Limit the cases of each test: more rounds, with fewer cases in each
     #[arg(long, value_name = "N")]
     cases: Option<u64>,
     /// Run only the tests whose names contain this
@@ -49,12 +49,12 @@ struct Target {
     /// The package's folder, where Cargo runs its tests.
     folder: PathBuf,
     package: String,
-    tests: BTreeMap<String, Count>,
+    tests: BTreeMap<String, RunCounts>,
 }
 
 /// Runs of a test, and how many of them failed.
 #[derive(Clone, Copy, Default)]
-struct Count {
+struct RunCounts {
     runs: u64,
     failures: u64,
 }
@@ -92,25 +92,25 @@ fn soak(arguments: &Arguments) -> Result<bool, String> {
             reported = Instant::now();
             let minutes = start.elapsed().as_secs_f64() / 60.0;
             let failures = sum(&targets).failures;
-            eprintln!("round {rounds} after {minutes:.1} minutes: {failures} failed");
+            eprintln!("round {rounds} after {minutes:.1} minutes: {failures} runs failed");
         }
     }
     for target in &targets {
         for (test, count) in &target.tests {
-            let Count { runs, failures } = count;
+            let RunCounts { runs, failures } = count;
             println!("{runs:6} runs {failures:3} failed  {}: {test}", target.name);
         }
     }
     let minutes = start.elapsed().as_secs_f64() / 60.0;
-    let Count { runs, failures } = sum(&targets);
+    let RunCounts { runs, failures } = sum(&targets);
     println!("{rounds} rounds in {minutes:.1} minutes: {failures} of {runs} runs failed");
     Ok(failures == 0)
 }
 
 /// The runs and failures of all targets.
-fn sum(targets: &[Target]) -> Count {
+fn sum(targets: &[Target]) -> RunCounts {
     let counts = targets.iter().flat_map(|target| target.tests.values());
-    counts.fold(Count::default(), |sum, count| Count {
+    counts.fold(RunCounts::default(), |sum, count| RunCounts {
         runs: sum.runs + count.runs,
         failures: sum.failures + count.failures,
     })
@@ -137,15 +137,15 @@ impl Target {
         };
         let output = command
             .output()
-            .map_err(|error| format!("{}: it cannot be run: {error}", self.program.display()))?;
-        let asked = fs::read_to_string(&log).unwrap_or_default();
+            .map_err(|error| format!("{}: cannot be run: {error}", self.program.display()))?;
+        let requested = fs::read_to_string(&log).unwrap_or_default();
         let _ = fs::remove_file(&log);
         let text = String::from_utf8_lossy(&output.stdout);
-        let mut asked: Vec<_> = asked.lines().collect();
-        asked.sort_unstable();
+        let mut requested: Vec<_> = requested.lines().collect();
+        requested.sort_unstable();
         // A test may request several generators.
-        asked.dedup();
-        for test in asked {
+        requested.dedup();
+        for test in requested {
             let failed = text.contains(&format!("test {test} ... FAILED"));
             let count = self.tests.entry(test.into()).or_default();
             count.runs += 1;
@@ -171,10 +171,13 @@ fn cargo(arguments: &[String]) -> Result<String, String> {
         .args(arguments)
         .stderr(Stdio::inherit())
         .output()
-        .map_err(|error| format!("cargo cannot be run: {error}"))?;
+        .map_err(|error| format!("cargo: cannot be run: {error}"))?;
     match output.status.success() {
         true => Ok(String::from_utf8_lossy(&output.stdout).into_owned()),
-        false => Err(format!("cargo {} failed", arguments.join(" "))),
+        false => Err(format!(
+            "`cargo {}` failed; see its messages above",
+            arguments.join(" ")
+        )),
     }
 }
 
@@ -236,7 +239,7 @@ fn targets() -> Result<Vec<Target>, String> {
         });
     }
     match targets.is_empty() {
-        true => Err("no target has a random test; is this the workspace?".into()),
+        true => Err("no target has a random test; run `cargo soak` in the workspace".into()),
         false => Ok(targets),
     }
 }

@@ -1,17 +1,16 @@
 //! The sweep of the renderer against the oracle: `cargo sweep`.
 
-use std::io::{IsTerminal, stderr};
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use indicatif::{ProgressBar, ProgressStyle};
-use oracle::check::{Case, Checker};
-use oracle::mix::Mix;
+use oracle::check::{CoverageCase, CoverageChecker};
+use oracle::mix::PolygonMix;
+use oracle::plane::{PlaneChecker, PlaneMix};
 use oracle::shrink::{shrink, source};
 use oracle::small_world::{STEPS, TRIANGLES, triangle};
-use oracle::{plane, solid};
+use oracle::solid::{Eye, SolidChecker, SolidCounts, SolidMix};
+use system::{Interrupted, Progress, catch_interrupts, interrupted};
 
 /// Compares the renderer with the oracle on random cases that are likely to fail: polygons in both scans,
 /// texels of the exact mapper, solids in any pose. Or on all triangles of a small world. Exit code 0: equal;
@@ -46,7 +45,7 @@ struct Arguments {
 
 fn step(text: &str) -> Result<i32, String> {
     let step = text.parse().ok().filter(|step| STEPS.contains(step));
-    step.ok_or_else(|| format!("the step is one of {STEPS:?}"))
+    step.ok_or_else(|| format!("the step must be {} or {}", STEPS[0], STEPS[1]))
 }
 
 /// Cases of each mix between two checks of the clock: a fraction of a second.
@@ -54,16 +53,11 @@ const ROUND: u64 = 1000;
 
 /// A solid needs as much time as some hundred polygons. With every 50th case only, solids, texels and
 /// polygons get about a third of the time each.
-const SOLIDS: u64 = 50;
-
-/// Interval between progress reports without a terminal.
-const SILENCE: Duration = Duration::from_secs(10);
-
-static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+const SOLID_STRIDE: u64 = 50;
 
 /// Results of a mix.
 #[derive(Clone, Copy, Default)]
-struct Tally {
+struct MixResults {
     tried: u64,
     polygons: u64,
     pixels: u64,
@@ -72,27 +66,27 @@ struct Tally {
 
 /// Further results of the solids.
 #[derive(Default)]
-struct Solids {
+struct SolidTotals {
     /// Pixels seen from outside.
     outside: u64,
-    compared: solid::Compared,
+    compared: SolidCounts,
 }
 
 /// A kind of case. A sweep alternates between all kinds.
 #[derive(Clone, Copy)]
-enum Kind {
-    Polygons(Mix),
-    Texels(plane::Mix),
-    Solids(solid::Mix),
+enum CaseKind {
+    Polygons(PolygonMix),
+    Texels(PlaneMix),
+    Solids(SolidMix),
     SmallWorld(i32),
 }
 
-impl Kind {
+impl CaseKind {
     /// All mixes.
     fn mixes() -> impl Iterator<Item = Self> {
-        let polygons = Mix::ALL.map(Self::Polygons);
-        let texels = plane::Mix::ALL.map(Self::Texels);
-        let solids = solid::Mix::ALL.map(Self::Solids);
+        let polygons = PolygonMix::ALL.map(Self::Polygons);
+        let texels = PlaneMix::ALL.map(Self::Texels);
+        let solids = SolidMix::ALL.map(Self::Solids);
         polygons.into_iter().chain(texels).chain(solids)
     }
 
@@ -108,16 +102,16 @@ impl Kind {
     /// Runs every Nth case only.
     fn stride(self) -> u64 {
         match self {
-            Self::Solids(_) => SOLIDS,
+            Self::Solids(_) => SOLID_STRIDE,
             _ => 1,
         }
     }
 
     /// The case, if this kind consists of polygons.
-    fn polygons(self, seed: u64, number: u64) -> Option<Case> {
+    fn polygons(self, seed: u64, number: u64) -> Option<CoverageCase> {
         match self {
             Self::Polygons(mix) => Some(mix.case(seed, number)),
-            Self::SmallWorld(step) => Some(Case {
+            Self::SmallWorld(step) => Some(CoverageCase {
                 polygons: vec![triangle(step, number as u32).to_vec()],
                 outline: None,
             }),
@@ -129,59 +123,59 @@ impl Kind {
 /// The checkers of each kind of case.
 #[derive(Default)]
 struct Checkers {
-    polygons: Checker,
-    texels: plane::Checker,
-    solids: solid::Checker,
+    polygons: CoverageChecker,
+    texels: PlaneChecker,
+    solids: SolidChecker,
     /// The solids' further results so far.
-    seen: Solids,
+    solid_totals: SolidTotals,
 }
 
 impl Checkers {
     /// Checks a case; returns `None` if it fails.
-    fn try_case(&mut self, kind: Kind, seed: u64, number: u64) -> Option<Tally> {
-        let tally = |polygons, pixels| Tally {
+    fn try_case(&mut self, kind: CaseKind, seed: u64, number: u64) -> Option<MixResults> {
+        let result = |polygons, pixels| MixResults {
             polygons,
             pixels,
-            ..Tally::default()
+            ..MixResults::default()
         };
         match kind {
-            Kind::Polygons(_) | Kind::SmallWorld(_) => {
+            CaseKind::Polygons(_) | CaseKind::SmallWorld(_) => {
                 let case = kind.polygons(seed, number)?;
                 let pixels = self.polygons.case(&case).ok()?;
-                Some(tally(case.polygons.len() as u64, pixels))
+                Some(result(case.polygons.len() as u64, pixels))
             }
-            Kind::Texels(mix) => {
+            CaseKind::Texels(mix) => {
                 let compared = self.texels.case(&mix.case(seed, number)).ok()?;
-                Some(tally(1, compared.samples))
+                Some(result(1, compared.samples))
             }
-            Kind::Solids(mix) => {
+            CaseKind::Solids(mix) => {
                 let case = mix.case(seed, number);
                 let compared = self.solids.case(&case).ok()?;
-                if case.eye == solid::Eye::Outside {
-                    self.seen.outside += compared.pixels;
+                if case.eye == Eye::Outside {
+                    self.solid_totals.outside += compared.pixels;
                 }
-                self.seen.compared += compared;
-                Some(tally(compared.faces, compared.pixels))
+                self.solid_totals.compared += compared;
+                Some(result(compared.faces, compared.pixels))
             }
         }
     }
 
     /// The source of a test with a failed case.
-    fn source(&mut self, kind: Kind, seed: u64, number: u64, from: &str) -> String {
+    fn source(&mut self, kind: CaseKind, seed: u64, number: u64, from: &str) -> String {
         const FAILS: &str = "a case fails again";
         match kind {
-            Kind::Polygons(_) | Kind::SmallWorld(_) => {
+            CaseKind::Polygons(_) | CaseKind::SmallWorld(_) => {
                 let case = kind.polygons(seed, number).expect("polygons");
                 let small = shrink(&mut self.polygons, &case);
                 let wrong = self.polygons.case(&small).expect_err(FAILS);
                 source(&small, &wrong, from)
             }
-            Kind::Texels(mix) => {
+            CaseKind::Texels(mix) => {
                 let small = mix.case(seed, number).shrink(&mut self.texels);
                 let wrong = self.texels.case(&small).expect_err(FAILS);
                 small.source(&wrong, from)
             }
-            Kind::Solids(mix) => {
+            CaseKind::Solids(mix) => {
                 let case = mix.case(seed, number);
                 let wrong = self.solids.case(&case).expect_err(FAILS);
                 case.source(&wrong, from)
@@ -192,7 +186,7 @@ impl Checkers {
 
 /// The kinds of a sweep, and how to repeat it.
 struct Plan {
-    kinds: Vec<Kind>,
+    kinds: Vec<CaseKind>,
     seed: u64,
     /// The options that repeat the same cases.
     options: String,
@@ -204,22 +198,22 @@ impl Plan {
     fn new(arguments: &Arguments) -> Result<Self, String> {
         if let Some(step) = arguments.small_world {
             return Ok(Self {
-                kinds: vec![Kind::SmallWorld(step)],
+                kinds: vec![CaseKind::SmallWorld(step)],
                 seed: 0,
                 options: format!("--small-world {step}"),
                 last: u64::from(TRIANGLES),
             });
         }
-        let named = |text: &String| Kind::mixes().any(|kind| kind.name().contains(text));
+        let named = |text: &String| CaseKind::mixes().any(|kind| kind.name().contains(text));
         if let Some(text) = arguments.only.iter().find(|text| !named(text)) {
-            let names: Vec<_> = Kind::mixes().map(Kind::name).collect();
+            let names: Vec<_> = CaseKind::mixes().map(CaseKind::name).collect();
             let names = names.join("\n  ");
             return Err(format!(
-                "no mix has {text:?} in its name; these are\n  {names}"
+                "--only {text:?}: no mix has this text in its name; the mixes are\n  {names}"
             ));
         }
         let only = &arguments.only;
-        let wanted = |kind: &Kind| {
+        let wanted = |kind: &CaseKind| {
             let name = kind.name();
             only.is_empty() || only.iter().any(|text| name.contains(text))
         };
@@ -229,7 +223,7 @@ impl Plan {
             .map(|text| format!(" --only {text:?}"))
             .collect();
         Ok(Self {
-            kinds: Kind::mixes().filter(wanted).collect(),
+            kinds: CaseKind::mixes().filter(wanted).collect(),
             seed,
             options: format!("--seed {seed}{only}"),
             last: u64::MAX,
@@ -237,10 +231,10 @@ impl Plan {
     }
 
     /// Names a case so that it can be repeated.
-    fn told(&self, kind: Kind, number: u64) -> String {
+    fn label(&self, kind: CaseKind, number: u64) -> String {
         let name = kind.name();
         match kind {
-            Kind::SmallWorld(_) => format!("cargo sweep {}: case {number}", self.options),
+            CaseKind::SmallWorld(_) => format!("cargo sweep {}: case {number}", self.options),
             _ => format!("cargo sweep --seed {}: {name}, case {number}", self.seed),
         }
     }
@@ -255,12 +249,27 @@ fn main() -> ExitCode {
             return ExitCode::from(2);
         }
     };
-    // No second Ctrl-C is needed: a round lasts a fraction of a second.
-    if let Err(error) = ctrlc::set_handler(|| INTERRUPTED.store(true, Ordering::Relaxed)) {
-        eprintln!("Ctrl-C will lose the figures: {error}");
-    }
+    catch_interrupts();
     println!("cargo sweep {}", plan.options);
     sweep(&plan, &arguments)
+}
+
+/// Announces the sweep, and returns its progress: in cases of each mix, or in seconds if only `limit` ends
+/// it.
+fn progress(limit: Option<Duration>, from: u64, end: u64) -> Progress {
+    let seconds = limit.map_or(0, |limit| limit.as_secs());
+    if end == u64::MAX {
+        return Progress::counting(format!("comparing for at most {seconds} s"), seconds);
+    }
+    let cases = end.saturating_sub(from);
+    let at_most = match limit {
+        Some(_) => format!(", for at most {seconds} s"),
+        None => String::new(),
+    };
+    Progress::counting(
+        format!("comparing {cases} cases of each mix{at_most}"),
+        cases,
+    )
 }
 
 fn sweep(plan: &Plan, arguments: &Arguments) -> ExitCode {
@@ -275,42 +284,45 @@ fn sweep(plan: &Plan, arguments: &Arguments) -> ExitCode {
         .or((end == u64::MAX).then_some(60))
         .map(Duration::from_secs);
     let begun = Instant::now();
-    let mut progress = Progress::new(limit, arguments.from, end);
-    let mut tallies = vec![Tally::default(); plan.kinds.len()];
+    let mut progress = progress(limit, arguments.from, end);
+    let mut results = vec![MixResults::default(); plan.kinds.len()];
     let mut failures = Vec::new();
     let mut checkers = Checkers::default();
     let mut number = arguments.from;
     while number < end && failures.is_empty() {
         let round = number..number.saturating_add(ROUND).min(end);
-        for (&kind, tally) in plan.kinds.iter().zip(&mut tallies) {
+        for (&kind, result) in plan.kinds.iter().zip(&mut results) {
             for number in round.clone() {
                 if number % kind.stride() != 0 {
                     continue;
                 }
-                tally.tried += 1;
+                result.tried += 1;
                 if let Some(more) = checkers.try_case(kind, plan.seed, number) {
-                    tally.polygons += more.polygons;
-                    tally.pixels += more.pixels;
+                    result.polygons += more.polygons;
+                    result.pixels += more.pixels;
                     continue;
                 }
-                tally.failed += 1;
+                result.failed += 1;
                 // The first failure of a mix is enough.
-                if tally.failed == 1 {
-                    let from = plan.told(kind, number);
+                if result.failed == 1 {
+                    let from = plan.label(kind, number);
                     failures.push(checkers.source(kind, plan.seed, number, &from));
                 }
             }
         }
         number = round.end;
-        progress.at(number, begun.elapsed());
+        progress.at(match end {
+            u64::MAX => begun.elapsed().as_secs(),
+            _ => number - arguments.from,
+        });
         let late = limit.is_some_and(|limit| begun.elapsed() >= limit);
-        if late || INTERRUPTED.load(Ordering::Relaxed) {
+        if late || interrupted() {
             break;
         }
     }
     drop(progress);
-    print(&plan.kinds, &tallies, begun.elapsed());
-    checkers.seen.print();
+    print(&plan.kinds, &results, begun.elapsed());
+    checkers.solid_totals.print();
     if !failures.is_empty() {
         for failure in failures {
             print!("\n{failure}");
@@ -323,112 +335,57 @@ fn sweep(plan: &Plan, arguments: &Arguments) -> ExitCode {
             plan.options
         );
     }
-    match INTERRUPTED.load(Ordering::Relaxed) {
-        true => ExitCode::from(130),
+    match interrupted() {
+        true => ExitCode::from(Interrupted::EXIT_CODE as u8),
         false => ExitCode::SUCCESS,
     }
 }
 
-fn print(kinds: &[Kind], tallies: &[Tally], took: Duration) {
-    let mut sum = Tally::default();
+/// Prints a line of results for each mix, and their sum.
+fn print(kinds: &[CaseKind], results: &[MixResults], elapsed: Duration) {
+    let mut sum = MixResults::default();
     println!(
         "{:35} {:>10} {:>11} {:>14} {:>7}",
         "", "tried", "polygons", "pixels", "failed"
     );
-    let line = |name: &str, tally: &Tally| {
-        let Tally {
+    let line = |name: &str, result: &MixResults| {
+        let MixResults {
             tried,
             polygons,
             pixels,
             failed,
-        } = tally;
+        } = result;
         println!("{name:35} {tried:10} {polygons:11} {pixels:14} {failed:7}");
     };
-    for (kind, tally) in kinds.iter().zip(tallies) {
-        line(&kind.name(), tally);
-        sum.tried += tally.tried;
-        sum.polygons += tally.polygons;
-        sum.pixels += tally.pixels;
-        sum.failed += tally.failed;
+    for (kind, result) in kinds.iter().zip(results) {
+        line(&kind.name(), result);
+        sum.tried += result.tried;
+        sum.polygons += result.polygons;
+        sum.pixels += result.pixels;
+        sum.failed += result.failed;
     }
     line("all", &sum);
-    println!("in {:.1} s", took.as_secs_f64());
+    println!("in {:.1} s", elapsed.as_secs_f64());
 }
 
-impl Solids {
+impl SolidTotals {
     /// Prints results that are not failures.
     fn print(&self) {
         let Self { outside, compared } = self;
         if *outside > 0 {
             println!(
-                "{} of {outside} pixels seen from outside lie in a fold: two facets have them, since \
-                 rounding turned one over at the silhouette",
+                "{} of {outside} pixels seen from outside lie in a fold: rounding turned a facet over at the \
+                 silhouette, so two facets cover the pixel",
                 compared.folds
             );
         }
         if compared.changed > 0 {
             let [near, guard] = compared.cut;
             println!(
-                "{} pixels lie across a true edge, by {:.5} pixel at most; {near} faces seen were cut by \
-                 the near plane, {guard} by the guard band",
+                "{} pixels changed sides of a true edge, at most {:.5} pixel from it; the near plane cut {near} \
+                 visible faces, the guard band {guard}",
                 compared.changed, compared.furthest
             );
-        }
-    }
-}
-
-/// Reports progress on standard error: a moving line on a terminal, a line from time to time elsewhere.
-struct Progress {
-    from: u64,
-    limit: Option<Duration>,
-    said: Instant,
-    bar: Option<ProgressBar>,
-}
-
-impl Progress {
-    fn new(limit: Option<Duration>, from: u64, end: u64) -> Self {
-        if let Some(limit) = limit {
-            eprintln!("at most {} s", limit.as_secs());
-        }
-        let bar = stderr().is_terminal().then(|| {
-            let (template, length) = match (end, limit) {
-                (u64::MAX, Some(limit)) => (
-                    "  {wide_bar} {pos} of {len} s, {msg} cases of each",
-                    limit.as_secs(),
-                ),
-                _ => (
-                    "  {wide_bar} {pos} of {len}, {elapsed}",
-                    end.saturating_sub(from),
-                ),
-            };
-            let style = ProgressStyle::with_template(template).expect("the template is constant");
-            ProgressBar::new(length).with_style(style)
-        });
-        let by_time = end == u64::MAX;
-        Self {
-            from,
-            limit: limit.filter(|_| by_time),
-            said: Instant::now(),
-            bar,
-        }
-    }
-
-    fn at(&mut self, number: u64, elapsed: Duration) {
-        let done = number - self.from;
-        if let Some(bar) = &self.bar {
-            bar.set_message(done.to_string());
-            bar.set_position(self.limit.map_or(done, |_| elapsed.as_secs()));
-        } else if self.said.elapsed() >= SILENCE {
-            self.said = Instant::now();
-            eprintln!("  {done} cases of each in {} s", elapsed.as_secs());
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }

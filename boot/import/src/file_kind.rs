@@ -1,10 +1,10 @@
-//! Recognises a file whose format is not the expected one.
+//! Recognises the formats of files that are neither an OBJ nor a PNG.
 
 use file_format::FileFormat;
 
 /// Returns the name of the format that a file's first bytes show. Returns `None` for an unknown format and
 /// for plain text, except for UTF-16 and UTF-32. `size` is the size of the whole file, if known.
-pub fn name(begin: &[u8], size: Option<usize>) -> Option<String> {
+pub fn of(begin: &[u8], size: Option<usize>) -> Option<String> {
     // No format needs more bytes than these to be recognised.
     let begin = &begin[..begin.len().min(4096)];
     match begin {
@@ -77,15 +77,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn formats_are_named_and_text_is_not() {
+    fn known_formats_are_named_and_plain_text_is_not() {
         let mut stl = b"solid but binary".to_vec();
         stl.resize(80, 0);
         stl.extend(2u32.to_le_bytes());
         stl.resize(84 + 100, 7);
         let size = stl.len();
-        assert_eq!(name(&stl, Some(size)).as_deref(), Some("binary STL"));
-        assert_eq!(name(&stl, Some(size + 1)).as_deref(), Some("STL"));
-        for (bytes, said) in [
+        assert_eq!(of(&stl, Some(size)).as_deref(), Some("binary STL"));
+        assert_eq!(of(&stl, Some(size + 1)).as_deref(), Some("STL"));
+        for (bytes, expected) in [
             (&b"\xFF\xD8\xFF\xE0\0\x10JFIF"[..], "JPEG"),
             (b"GIF89a", "GIF"),
             (b"RIFF\x10\0\0\0WEBPVP8 ", "WebP"),
@@ -128,8 +128,8 @@ mod tests {
             (b"\xFF\xFE\0\0v\0\0\0", "UTF-32 text"),
         ] {
             assert_eq!(
-                name(bytes, None).as_deref(),
-                Some(said),
+                of(bytes, None).as_deref(),
+                Some(expected),
                 "{}",
                 bytes.escape_ascii()
             );
@@ -145,7 +145,7 @@ mod tests {
             b"solidus",
         ] {
             assert_eq!(
-                name(bytes, Some(bytes.len())),
+                of(bytes, Some(bytes.len())),
                 None,
                 "{}",
                 bytes.escape_ascii()
