@@ -331,7 +331,7 @@ mod tests {
                 };
                 assert!(
                     sways || (least..most).contains(&motion.pixels),
-                    "{} at {tick}: {motion:?}",
+                    "{} at {tick}: {motion:?} is outside {least}..{most}; change the pose, or add the scene to `sways`",
                     entry.name
                 );
                 pixels.push(found);
@@ -396,7 +396,12 @@ mod tests {
                 }
             }
             let in_plane = ["facing", "tilted"].contains(&entry.name);
-            assert_eq!(reduced == 0, in_plane, "{}: {reduced}", entry.name);
+            assert_eq!(
+                reduced == 0,
+                in_plane,
+                "{}: {reduced} faces in reduced quality; `in_plane` lists the scenes that move in their plane",
+                entry.name
+            );
         });
     }
 }
