@@ -12,8 +12,7 @@ use oracle::solid::{self, Checker, Compared, Solid};
 use oracle::texel::{affine, perspective};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{FOCAL_LENGTH, Pose, Stage, Storage};
-use texmap::loops::Loop;
-use texmap::{Face, Mapper, Point, Texture};
+use texmap::{Face, Loop, Mapper, Point, Texture};
 
 /// The affine mapper's coordinates are within 2^-7 texel of the exact coordinates: 2^-8 where a whole texture
 /// is squeezed into a sliver, and 240 steps, each rounded by less than 2^-16.

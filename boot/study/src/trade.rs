@@ -24,8 +24,7 @@ use anyhow::{Context, ensure};
 use clap::builder::PossibleValuesParser;
 use model::{Arena, ModelFile};
 use scene::catalogue::Entry;
-use texmap::loops::Loop;
-use texmap::{Mapper, Order};
+use texmap::{Loop, Mapper, Order};
 
 use crate::measure::{self, Measured};
 use system::Step;

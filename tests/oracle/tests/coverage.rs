@@ -7,8 +7,8 @@ use oracle::check::{Case, Checker};
 use oracle::mix::Mix;
 use oracle::shrink::{shrink, source};
 use oracle::small_world::{STEPS, TRIANGLES, triangle};
-use texmap::coverage::{self, Dropped};
-use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
+use texmap::scan;
+use texmap::{Dropped, MAX_COORDINATE, MAX_SIDES, Point};
 
 /// Cases of each mix: ten seconds of them.
 const CASES: usize = 100_000;
@@ -105,7 +105,7 @@ fn beyond_the_range_a_polygon_is_dropped_and_gives_no_run() {
         (shifted(0, 1), Dropped::OutOfRange),
         (with_sides(MAX_SIDES + 1), Dropped::TooManySides),
     ] {
-        assert_eq!(coverage::columns(&polygon, panics), Err(why));
-        assert_eq!(coverage::rows(&polygon, panics), Err(why));
+        assert_eq!(scan::columns(&polygon, panics), Err(why));
+        assert_eq!(scan::rows(&polygon, panics), Err(why));
     }
 }

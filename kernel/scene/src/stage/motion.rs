@@ -31,9 +31,9 @@
 //! wave of w radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
 
 use modex::{HEIGHT, Palette, WIDTH};
-use texmap::coverage::{Axis, spans};
 use texmap::plane::{Anchor, Plane, coordinate};
-use texmap::{Face, Mapper, Texture};
+use texmap::scan::spans;
+use texmap::{Axis, Face, Mapper, Texture};
 
 use super::{Stage, lit, polygons};
 use crate::pose::Orientation;

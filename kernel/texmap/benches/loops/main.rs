@@ -1,14 +1,13 @@
 //! The column loops alone: a frame of 320 columns of 200 pixels in RAM.
 //!
 //! `cargo bench -p texmap` prints cycles a pixel, and what they are of the bare loop's in the same
-//! order and of the packed loop's in x order. Times are ratios within one run: the rounds go
+//! order and of the packed loop's in x order. Times are ratios within one span: the rounds go
 //! through all loops in turn, and a row has the medians.
 
 mod work;
 
 use modex::PlanarBuffer;
-use texmap::loops::Loop;
-use texmap::{Mapper, Rows};
+use texmap::{Loop, Mapper, Rows};
 use work::{By, Order, PIECES, PIXELS, draw, texels, texture};
 
 /// All that is timed.
@@ -109,7 +108,7 @@ mod cycles {
                 },
             );
         }
-        // What `texmap::adaptive` counts with.
+        // What `texmap::mappers::adaptive` counts with.
         for order in [Order::X, Order::Planes] {
             let [short, long] = [PIECES[0], PIECES[PIECES.len() - 1]];
             let more = median(By::Pieces(short), order) - median(By::Pieces(long), order);
