@@ -202,7 +202,7 @@ const MUTANTS: &[Mutant] = &[
         "(a / c) as usize", "((a + c / 2) / c) as usize"),
     // Mappers within an error, and visibility.
     mutant("a line kept that errs too much", ADAPTIVE,
-        "depth > 0 && self.near * self.chords.cut(depth) >= self.least", "depth > 0"),
+        "c > 0 && self.near * self.chords.cut(c) >= self.least", "c > 0"),
     mutant("a clamped end not paid for", ADAPTIVE,
         "self.chords.least(steps, self.outside.max(there.1))", "self.chords.least(steps, 0)"),
     mutant("a line from its wrong end", ADAPTIVE,

@@ -71,7 +71,7 @@ const ALONG: [&str; 6] = [
 const BY_LENGTH: [&str; 8] = [
     "row-steps",
     "packed",
-    "two-steps",
+    "step-table",
     "shifts",
     "extract",
     "linear-16",

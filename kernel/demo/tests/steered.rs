@@ -305,8 +305,8 @@ fn a_split_view_shows_the_same_part_three_times() {
             "shifts",
             "row-multiply",
             "row-passes",
-            "free",
-            "nearer",
+            "free-direction",
+            "row-or-column",
             "exact",
         ] {
             done(&mut show, &format!("mapper {mapper}"), 0);

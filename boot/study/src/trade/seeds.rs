@@ -63,9 +63,9 @@ const NOT_MEASURED: &str = "not measured: its mappers were left out";
 /// Angles between the screen's axes and the line of constant depth, in tenths of a degree.
 const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
 
-/// Returns the accuracy of the mapper `free` at each of `TILTS`, if the mapper exists.
+/// Returns the accuracy of the mapper `free-direction` at each of `TILTS`, if the mapper exists.
 pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
-    let free = Mapper::parse("free")?;
+    let mapper = Mapper::parse("free-direction")?;
     let entry = Entry::parse("grazing-16")?;
     let mut jobs = Box::new(Jobs::new());
     let tilts = TILTS.map(|tenths| {
@@ -74,7 +74,7 @@ pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
             ..entry.pose(0)
         };
         let accuracy = with_poses(entry, &[pose], |subject| {
-            accuracy::measure(subject, free, &mut jobs)
+            accuracy::measure(subject, mapper, &mut jobs)
         });
         (f64::from(tenths) / 10.0, accuracy)
     });
@@ -102,10 +102,10 @@ pub fn trials(
         },
         None => String::new(),
     };
-    let two_steps = match (
-        loops.time("two-steps", Polygons),
+    let step_table = match (
+        loops.time("step-table", Polygons),
         loops.time("packed", Polygons),
-        loops.time("two-steps", Planes),
+        loops.time("step-table", Planes),
         loops.time("packed", Planes),
     ) {
         (Some(a), Some(b), Some(c), Some(d)) => {
@@ -156,7 +156,7 @@ pub fn trials(
         Trial {
             place: "58, of John Miles's loop",
             claimed: "a table of two steps costs half a cycle to one more than the branch",
-            measured: two_steps,
+            measured: step_table,
             why: "Carries come as regularly as steps add up, which today's predictors learn: then \
                   the branch is free, as it nearly was. Where they do not learn it, a wrong guess \
                   costs some 15 cycles, and the table none.",
@@ -286,7 +286,7 @@ mod tests {
                 ("row-steps", 6.0),
                 ("two-carries", 4.0),
                 ("packed", 3.0),
-                ("two-steps", 2.0),
+                ("step-table", 2.0),
                 ("extract", 1.0),
             ] {
                 all.push(swept(mapper, order, time * scale));

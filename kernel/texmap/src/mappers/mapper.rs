@@ -78,7 +78,7 @@ impl Mapper {
             "columns; both fractions in one register, one branch (chapter 58's last)",
         ),
         (
-            "two-steps",
+            "step-table",
             Self::Affine(Loop::StepTable),
             "columns; the carry picks one of two steps, no branch (John Miles)",
         ),
@@ -88,7 +88,7 @@ impl Mapper {
             "columns; two accumulators, shifts and masks",
         ),
         (
-            "joined",
+            "one-accumulator",
             Self::Affine(Loop::OneAccumulator),
             "columns; one accumulator, shifts and masks",
         ),
@@ -148,7 +148,7 @@ impl Mapper {
             "perspective; quadratic through three quotients of each column",
         ),
         (
-            "nearer",
+            "row-or-column",
             Self::RowOrColumn,
             "perspective; linear-16 along columns or rows, whichever changes the depth less",
         ),
@@ -158,12 +158,12 @@ impl Mapper {
             "perspective; quotients at the corners of tiles of 16 x 16 pixels, affine inside",
         ),
         (
-            "free",
+            "free-direction",
             Self::FreeDirection,
             "perspective; one division for each line of constant depth, in any direction",
         ),
         (
-            "level",
+            "constant-z",
             Self::ConstantZ,
             "perspective; one division for each column of a wall or row of a floor, otherwise exact",
         ),
@@ -199,8 +199,26 @@ impl Mapper {
         ),
     ];
 
-    /// Returns the mapper with this name, if any. `within-` may be followed by any [`Tolerance`].
+    /// The names that mappers had before, each with its present name. [`Mapper::parse`] accepts
+    /// them for one version.
+    pub const RENAMED: [(&'static str, &'static str); 5] = [
+        ("two-steps", "step-table"),
+        ("joined", "one-accumulator"),
+        ("nearer", "row-or-column"),
+        ("free", "free-direction"),
+        ("level", "constant-z"),
+    ];
+
+    /// Returns the present name of a mapper that was renamed, or nothing for any other name.
+    pub fn renamed(name: &str) -> Option<&'static str> {
+        let found = Self::RENAMED.iter().find(|(old, _)| *old == name);
+        found.map(|&(_, new)| new)
+    }
+
+    /// Returns the mapper with this name, if any: a name in [`Mapper::ALL`], a former name, or
+    /// `within-` and any [`Tolerance`].
     pub fn parse(name: &str) -> Option<Self> {
+        let name = Self::renamed(name).unwrap_or(name);
         if let Some(tolerance) = name.strip_prefix("within-") {
             return Tolerance::parse(tolerance).map(Self::Within);
         }
@@ -290,6 +308,15 @@ impl fmt::Display for Mapper {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn former_names_are_read_and_no_longer_written() {
+        for (old, new) in Mapper::RENAMED {
+            let mapper = Mapper::parse(old).unwrap();
+            assert_eq!((mapper.name(), Mapper::parse(new)), (new, Some(mapper)));
+            assert!(Mapper::ALL.iter().all(|(name, ..)| *name != old), "{old}");
+        }
+    }
 
     /// One list may hold jobs of both mappers.
     #[test]
