@@ -273,7 +273,7 @@ fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewher
     }
 }
 
-/// EdgeInterpolant a line of constant depth the only error is the half pixel across it, so a line along rows or columns
+/// Along a line of constant depth the only error is the half pixel across it, so a line along rows or columns
 /// has no error but drift.
 #[test]
 fn a_free_line_without_slope_goes_through_the_centres() {

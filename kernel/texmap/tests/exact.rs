@@ -5,7 +5,7 @@ use oracle::plane::{Checker, Compared, FOCAL_LENGTH, Mix, anchor};
 use oracle::texel::forms;
 use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING};
 
-/// Cases of each mix: as many as `cargo sweep --only texels` spans in half a second.
+/// Cases of each mix: as many as `cargo sweep --only texels` runs in half a second.
 const CASES: u64 = 1500;
 
 #[test]

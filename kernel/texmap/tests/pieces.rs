@@ -91,7 +91,7 @@ fn a_step_is_cut_towards_zero() {
 }
 
 #[test]
-fn what_is_drawn_are_the_texels_of_the_coordinates() {
+fn drawn_texels_are_those_of_the_coordinates() {
     let mut random = seeded::generator();
     let texels: Vec<u8> = (0..1 << 16).map(|_| random.u8(..)).collect();
     let (mut page, mut planes) = (PlanarBuffer::new(), PlanarBuffer::new());
@@ -145,7 +145,7 @@ fn what_is_drawn_are_the_texels_of_the_coordinates() {
 /// sources divide by end - start in one place and by end - start - 1 in another, so one of the two reaches
 /// its end a pixel too soon or too late.
 #[test]
-fn pieces_meet_at_their_quotients_and_the_run_ends_at_its_own() {
+fn pieces_and_the_span_end_at_exact_quotients() {
     let mut random = seeded::generator();
     let texture = Texture::new(&[0; 256 * 256], 256, 256).unwrap();
     for _ in 0..seeded::cases(5_000) {
@@ -278,7 +278,7 @@ fn measure(columns: u32, mapper: (&str, Subdivision, bool), random: &mut fastran
         errors.worst = errors.worst.max(error / 65536.0);
         let [from, to] = bounds.ends;
         let change = (to.0 - from.0).abs().max((to.1 - from.1).abs());
-        // ReciprocalAbove 1/32 texel, fixed point adds at most a tenth.
+        // Above 1/32 texel, fixed point adds at most a tenth.
         if bound > 2048.0 && bound < 0.7 * f64::from(change) {
             errors.closed = errors.closed.max(share);
             errors.spans += 1;

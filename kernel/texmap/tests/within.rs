@@ -338,7 +338,7 @@ fn within(least: u32, tolerance: &str) {
 
 /// The lengths of pieces are those that pay.
 #[test]
-fn a_shorter_piece_would_take_longer_than_quotients() {
+fn a_shorter_piece_would_cost_more_than_quotients() {
     let shortest = u32::from(LENGTHS[LENGTHS.len() - 1]);
     assert!(PIECE + shortest < EXACT * shortest);
     let less = shortest - 4;
@@ -373,7 +373,7 @@ fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>
 /// The axis is chosen from a polygon's corners. Measures how close that choice comes to the cost of all
 /// spans.
 #[test]
-fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
+fn the_chosen_axis_is_nearly_always_the_cheaper_axis() {
     let mut random = seeded::generator();
     for tolerance in ["1", "1/4", "1/16"] {
         let tolerance = Tolerance::parse(tolerance).unwrap();
@@ -407,7 +407,7 @@ fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
 }
 
 #[test]
-fn every_run_keeps_to_its_error_and_none_wastes_anything() {
+fn every_span_keeps_to_its_error_at_the_least_cost() {
     for tolerance in ["1", "1/2", "1/4", "1/16", "1/256"] {
         within(COLUMNS, tolerance);
     }
@@ -416,7 +416,7 @@ fn every_run_keeps_to_its_error_and_none_wastes_anything() {
 /// `cargo test --release -p texmap --test within -- --ignored --nocapture`
 #[test]
 #[ignore = "a million columns and rows for each error: some minutes in a release build"]
-fn every_run_of_a_million_keeps_to_its_error() {
+fn every_span_of_a_million_keeps_to_its_error() {
     for tolerance in ["1", "1/2", "1/4", "1/16", "1/256"] {
         within(DEEP_COLUMNS, tolerance);
     }
@@ -593,7 +593,7 @@ fn names_say_the_error() {
 
 /// The faces of these tests cover the pixels that their polygons do.
 #[test]
-fn a_run_is_inside_its_polygon() {
+fn a_span_is_inside_its_polygon() {
     let mut random = seeded::generator();
     columns(2_000, &mut random, |face, _, _, span| {
         let points: Vec<Point> = face.polygon.iter().map(|&vertex| vertex.into()).collect();

@@ -1,7 +1,7 @@
 //! The column loops alone: a frame of 320 columns of 200 pixels in RAM.
 //!
 //! `cargo bench -p texmap` prints cycles a pixel, and what they are of the bare loop's in the same
-//! order and of the packed loop's in x order. Times are ratios within one span: the rounds go
+//! order and of the packed loop's in x order. Times are ratios within one run: the rounds go
 //! through all loops in turn, and a row has the medians.
 
 mod work;

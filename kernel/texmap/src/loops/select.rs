@@ -2,9 +2,9 @@
 //!
 //! Each loop draws steps inside the texture with exactly the texels of its reference
 //! implementation, [`column`](super::stepper::column). A loop with fewer bits than the stepper
-//! draws the texels that the reference implementation draws for [`Loop::effective`]. On x86-64 a loop is
-//! written in assembly. On other CPUs, and in [`Loop::portable`] everywhere, plain Rust steps the
-//! same registers.
+//! draws the texels that the reference implementation draws for [`Loop::effective`]. On x86-64 a
+//! loop is written in assembly. On other CPUs, and in [`Loop::portable`] everywhere, plain Rust
+//! steps the same registers.
 //!
 //! # Why no loop checks what it reads
 //!
@@ -13,12 +13,12 @@
 //!
 //! - *Checked at both ends.* [`Loop::TwoCarries`], [`Loop::Packed`], [`Loop::StepTable`] and
 //!   [`Loop::AddCarry`] keep an address or whole texels. The coordinates of the first and the last
-//!   pixel are tested once per column, as the loop steps them. The steps are constant, so every pixel
-//!   between lies inside the texture, too. The step after the last pixel may leave the texture, but
-//!   nothing is read there. A stepper that fails the test panics.
-//! - *Masked.* [`Loop::Shifts`], [`Loop::OneAccumulator`] and [`Loop::Extract`] build the index from as
-//!   many bits of each coordinate as a padded texture has columns and rows, so no index can leave
-//!   the texture. They draw any stepper.
+//!   pixel are tested once per column, as the loop steps them. The steps are constant, so every
+//!   pixel between lies inside the texture, too. The step after the last pixel may leave the
+//!   texture, but nothing is read there. A stepper that fails the test panics.
+//! - *Masked.* [`Loop::Shifts`], [`Loop::OneAccumulator`] and [`Loop::Extract`] build the index
+//!   from as many bits of each coordinate as a padded texture has columns and rows, so no index can
+//!   leave the texture. They draw any stepper.
 //!
 //! A loop writes the column and nothing else: the column's length counts the stores.
 //!
@@ -115,7 +115,8 @@ impl Loop {
         }
     }
 
-    /// Returns the stepper that the loop actually uses for `stepper`: it reads at these coordinates.
+    /// Returns the stepper that the loop actually uses for `stepper`: it reads at these
+    /// coordinates.
     ///
     /// Only [`Loop::Packed`] has fewer bits. It drops the last bit of v and of v's step. The step
     /// is cut towards zero, so the span stays as far inside the texture as before. After i pixels v

@@ -26,7 +26,8 @@ pub struct AffineStepper {
 }
 
 impl AffineStepper {
-    /// Returns the stepper that starts at pixel `pixels` of this stepper and steps by `stride` pixels.
+    /// Returns the stepper that starts at pixel `pixels` of this stepper and steps by `stride`
+    /// pixels.
     pub fn every(&self, stride: i32, pixels: i32) -> Self {
         let Self { u, v, du, dv } = *self;
         Self {

@@ -11,7 +11,8 @@ pub enum Rows {
     Steps,
     /// Draws the row in four passes, one for each plane.
     Passes,
-    /// Makes all texels one after the other, and then writes the planes: see [`modex::Destination::line`].
+    /// Makes all texels one after the other, and then writes the planes: see
+    /// [`modex::Destination::line`].
     #[default]
     Lines,
 }

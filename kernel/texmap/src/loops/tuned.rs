@@ -7,8 +7,8 @@
 //! address, DEC counts), so a loop may keep a carry in it. The fastest loops have a second frame,
 //! for pieces of columns whose pixels come in eights.
 //!
-//! Every function gets the first values of its registers in a type of [`super::registers`]. That type
-//! was made from a stepper that stays in the texture, or has masks that do.
+//! Every function gets the first values of its registers in a type of [`super::registers`]. That
+//! type was made from a stepper that stays in the texture, or has masks that do.
 
 #![allow(unsafe_code)]
 

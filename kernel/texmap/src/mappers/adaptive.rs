@@ -1,19 +1,19 @@
 //! Adaptive subdivision: perspective by linear pieces, each as long as an error allows.
 //!
-//! AdaptivePieces are linear between the quotients at their ends, as in [`super::linear`], but the length of
-//! a piece depends on where it lies. The texture coordinate is most curved far away. So pieces are
-//! made from the span's near end on, and become shorter and shorter. Where even the shortest piece
-//! errs too much, the rest of the span is drawn exactly.
+//! Pieces are linear between the quotients at their ends, as in [`super::linear`], but the length
+//! of a piece depends on where it lies. The texture coordinate is most curved far away. So pieces
+//! are made from the span's near end on, and become shorter and shorter. Where even the shortest
+//! piece errs too much, the rest of the span is drawn exactly.
 //!
 //! # How long
 //!
-//! A piece of n pixels keeps to the tolerance where the geometric mean of the depths at its ends is
-//! large enough ([`crate::plane::bounds`]). One multiplication decides that, before any quotient is
-//! computed. (A depth here is a value of the form c, which is large near the eye.) If the whole
-//! span keeps to the tolerance, it is one piece. Otherwise each piece has the longest of the
-//! [`LENGTHS`] that keeps to the tolerance there. No piece is longer than the piece before it,
-//! since c falls. The last piece at the far end may be shorter, and is judged as if it had its full
-//! length.
+//! A piece of n pixels keeps to the tolerance where the geometric mean of the inverse depths at its
+//! ends is large enough ([`crate::plane::bounds`]). One multiplication decides that, before any
+//! quotient is computed. (The inverse depth is the value of the form c, which is large near the
+//! eye.) If the whole span keeps to the tolerance, it is one piece. Otherwise each piece has the
+//! longest of the [`LENGTHS`] that keeps to the tolerance there. No piece is longer than the piece
+//! before it, since c falls. The last piece at the far end may be shorter, and is judged as if it
+//! had its full length.
 //!
 //! Error: at most the tolerance, which covers everything: the chords, their ends (rounded down, and
 //! clamped into the texture), and the steps, which are cut towards zero. Where a clamp alone
@@ -50,7 +50,8 @@ pub struct AffinePiece {
     pub stepper: AffineStepper,
 }
 
-/// Cuts a span into pieces, from its near end on. Then [`AdaptivePieces::rest`] returns what is left.
+/// Cuts a span into pieces, from its near end on. Then [`AdaptivePieces::rest`] returns what is
+/// left.
 #[derive(Clone, Copy, Debug)]
 pub struct AdaptivePieces {
     /// The forms from the start of the next piece on, away from the near end.
@@ -63,14 +64,14 @@ pub struct AdaptivePieces {
     chords: Chords,
     /// Steps of the next piece, if it keeps to the tolerance.
     longest: u16,
-    /// The least product of the depths at the next piece's ends.
+    /// The least product of the inverse depths at the next piece's ends.
     least: u64,
     /// Index of the next shorter of the [`LENGTHS`].
     shorter: usize,
     /// Pixels by which the first piece is shorter than its length.
     lead: u16,
-    /// Start of the next piece: its depth, its coordinates, and the amount by which they were
-    /// clamped.
+    /// Start of the next piece: its inverse depth, its coordinates, and the amount by which they
+    /// were clamped.
     near: u64,
     here: (i32, i32),
     outside: u32,
@@ -79,8 +80,8 @@ pub struct AdaptivePieces {
 }
 
 impl AdaptivePieces {
-    /// Returns the pieces of the span of `len` pixels, at least 1, along `stepper`. For a row, `row`
-    /// is the x of its first pixel.
+    /// Returns the pieces of the span of `len` pixels, at least 1, along `stepper`. For a row,
+    /// `row` is the x of its first pixel.
     pub fn new(
         stepper: &PlaneStepper,
         len: u16,
@@ -98,9 +99,9 @@ impl AdaptivePieces {
                 (PlaneStepper { at: end, step }, stepper.at)
             }
         };
-        let depth = stepper.at[2].max(1);
-        let chords = Chords::new(&[stepper], depth, tolerance.units());
-        let near = chords.cut(depth);
+        let c = stepper.at[2].max(1);
+        let chords = Chords::new(&[stepper], c, tolerance.units());
+        let near = chords.cut(c);
         let (here, outside) = coordinates(stepper.at, last);
         let mut pieces = Self {
             stepper,
@@ -153,10 +154,10 @@ impl AdaptivePieces {
         Some(())
     }
 
-    /// Returns whether the next piece may end at this depth.
+    /// Returns whether the next piece may end at this inverse depth.
     #[inline]
-    fn keeps(&self, depth: i64) -> bool {
-        depth > 0 && self.near * self.chords.cut(depth) >= self.least
+    fn keeps(&self, c: i64) -> bool {
+        c > 0 && self.near * self.chords.cut(c) >= self.least
     }
 
     /// Returns the steps of the next piece, at most `steps`, the forms at its end, and the

@@ -2,12 +2,12 @@
 //!
 //! [`Sides`] has the coordinates along a polygon's sides, and makes the stepper of a span: exactly
 //! between the two crossings, or by chapter 57's half steps. In a triangle the coordinates are one
-//! affine map of the screen. Where that map is within its legal range, [`AffineMap`] holds it and makes
-//! steppers at a fraction of the cost.
+//! affine map of the screen. Where that map is within its legal range, [`AffineMap`] holds it and
+//! makes steppers at a fraction of the cost.
 //!
-//! Error against the exact affine coordinates: the step is cut to 2^-16 texel towards zero, so after n pixels the
-//! coordinate is off by less than n 2^-16 texel, at most 0.0037 texel over 240 pixels. The half
-//! steps follow a different rule: see [`Sides::half_step`].
+//! Error against the exact affine coordinates: the step is cut to 2^-16 texel towards zero, so
+//! after n pixels the coordinate is off by less than n 2^-16 texel, at most 0.0037 texel over 240
+//! pixels. The half steps follow a different rule: see [`Sides::half_step`].
 
 use modex::{HEIGHT, WIDTH};
 
@@ -180,13 +180,13 @@ impl Sides {
 /// The single affine map of a triangle: both gradients are computed once, and a span needs no
 /// division unless it is cut at the texture's border.
 ///
-/// Legal input: three corners within [`AffineMap::REACH`] of the screen's middle in x and in y, in the
-/// texture or on its border, with less than 256 texels per pixel across and down the screen. Other
-/// polygons have no map; [`Sides`] makes their steppers.
+/// Legal input: three corners within [`AffineMap::REACH`] of the screen's middle in x and in y, in
+/// the texture or on its border, with less than 256 texels per pixel across and down the screen.
+/// Other polygons have no map; [`Sides`] makes their steppers.
 ///
 /// Error against the exact affine coordinates: less than 3 2^-16 texel at the first pixel (see
-/// [`AffineMap::new`]; this includes rounding down), and less than another n 2^-16 texel after n pixels,
-/// because the step is cut towards zero.
+/// [`AffineMap::new`]; this includes rounding down), and less than another n 2^-16 texel after n
+/// pixels, because the step is cut towards zero.
 #[derive(Clone, Copy, Debug)]
 pub struct AffineMap {
     u: Gradient,

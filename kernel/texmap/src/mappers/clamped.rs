@@ -1,12 +1,11 @@
 //! Clamped steps: constant steps that may leave the texture, cut into pieces where they do.
 //!
-//! An approximation is only close to the exact coordinates, and the exact coordinates of a pixel
-//! at the polygon's border lie at the texture's border. So the steps may cross the border by as much
+//! An approximation is only close to the exact coordinates, and the exact coordinates of a pixel at
+//! the polygon's border lie at the texture's border. So the steps may cross the border by as much
 //! as its error. Clamping one of the ends into the texture would bend the whole span. Instead, the
 //! span is cut into pieces that lie inside and pieces that lie beyond a border, and beyond a border
-//! the coordinate stays on the last texel. Every pixel then has its own coordinates,
-//! clamped, and clamping brings them no further from any coordinates inside the texture. No inner
-//! loop clamps.
+//! the coordinate stays on the last texel. Every pixel then has its own coordinates, clamped, and
+//! clamping brings them no further from any coordinates inside the texture. No inner loop clamps.
 
 use crate::loops::AffineStepper;
 use crate::plane::Reciprocal;

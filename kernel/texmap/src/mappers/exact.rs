@@ -15,8 +15,8 @@
 //! # Why most pixels are not divided
 //!
 //! Where the coordinates curve little enough, the loop first makes a linear estimate, with a margin
-//! from [`crate::plane::bounds`] that its error never exceeds. If the estimate minus the margin and the
-//! estimate plus the margin have the same floor, the quotient between them has it too, and that
+//! from [`crate::plane::bounds`] that its error never exceeds. If the estimate minus the margin and
+//! the estimate plus the margin have the same floor, the quotient between them has it too, and that
 //! floor *is* the texel. Otherwise the estimate lies within the margin of a texel's border, and the
 //! loop divides. With the largest margin, `MARGIN`, it divides at most one pixel in 8 if the
 //! texture coordinates are spread evenly.

@@ -1,8 +1,8 @@
 //! The free-direction mapper: spans along the lines of constant depth, in whatever direction they
-//! span.
+//! run.
 //!
-//! Every plane has lines of constant depth on the screen: along them c stays constant, so
-//! c.right dx + c.down dy = 0. EdgeInterpolant such a line u and v are linear, and one division serves the
+//! Every plane has lines of constant depth on the screen: along them c stays constant, so c.right
+//! dx + c.down dy = 0. Along such a line u and v are linear, and one division serves the
 //! whole line. Pixels do not lie exactly on the line, so the mapper draws it through the pixels
 //! nearest to it. A line nearer the horizontal has one pixel in every column that it crosses, and a
 //! line nearer the vertical has one pixel in every row. All lines are copies of one line, moved by
@@ -22,11 +22,11 @@
 //! Across its direction, the line passes up to half a pixel beside the centres of its pixels: down
 //! the column for a line nearer the horizontal. In that direction u is a hyperbola. So the error is
 //! at most the sum of three terms: the larger of u's differences between the centre and the two
-//! places [`LARGEST_DISTANCE`] above and below it; [`drift`](super::constant_z::drift) for the pixel's
-//! number in its line; and one unit in the last place of the forms for each of the line's pixels.
-//! To first order that is half a pixel's worth of the texture's gradient across the line, and this
-//! error does occur. Where c is not above zero on a line, or the line's coordinates go further than
-//! 4096 texels, its pixels are drawn exactly.
+//! places [`LARGEST_DISTANCE`] above and below it; [`drift`](super::constant_z::drift) for the
+//! pixel's number in its line; and one unit in the last place of the forms for each of the line's
+//! pixels. To first order that is half a pixel's worth of the texture's gradient across the line,
+//! and this error does occur. Where c is not above zero on a line, or the line's coordinates go
+//! further than 4096 texels, its pixels are drawn exactly.
 
 use super::clamped::ConstantDepthForms;
 use super::mapped_span::{MappedSpan, SpanKind};
@@ -102,8 +102,8 @@ impl ConstantDepthLines {
             Axis::Right => WIDTH,
             Axis::Down => HEIGHT,
         };
-        // ConstantDepthLines are numbered from 0, so that no line lies before the screen's first pixel. A line
-        // without slope passes through the pixels' centres.
+        // Lines are numbered from 0, so that no line lies before the screen's first
+        // pixel. A line without slope passes through the pixels' centres.
         let furthest = HALF + slope * (pixels as i32 - 1);
         let start = HALF - (furthest.max(HALF) >> LINE_FRACTION << LINE_FRACTION);
         Self {

@@ -82,8 +82,8 @@ pub(crate) fn drawing(by: Loop) -> DrawLinear {
     }
 }
 
-/// Draws a column that is linear in each piece. `draw_piece` draws a piece. `draw_eights` draws pieces
-/// whose pixels come in whole eights, where there are enough pieces to make it worthwhile.
+/// Draws a column that is linear in each piece. `draw_piece` draws a piece. `draw_eights` draws
+/// pieces whose pixels come in whole eights, where there are enough pieces to make it worthwhile.
 #[inline(always)]
 fn draw(
     texture: &Texture<'_>,
@@ -112,8 +112,8 @@ fn draw(
         Subdivision::Powers => LONGEST_POWER,
         Subdivision::Whole => 0,
     };
-    // Subdivision of equally many steps, a power of two. The last piece has one pixel more, so it is not
-    // among them.
+    // Pieces of equally many steps, a power of two. The last piece has one pixel more, so it
+    // is not among them.
     if left > alike
         && alike >= 8
         && alike.is_power_of_two()

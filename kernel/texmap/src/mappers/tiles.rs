@@ -14,10 +14,10 @@
 //! # Error
 //!
 //! Let u change by du between two places with the depth ratio r (at least 1). Linear interpolation
-//! between them is off by at most |du| (sqrt r - 1)/(sqrt r + 1). EdgeInterpolant the top and the bottom of
-//! the tile, that bounds the error at the column's two ends, and a pixel between the ends gets a
-//! weighted mean of the two errors. Down the column the same formula applies once more, to the
-//! interpolation between the exact coordinates at these ends. So the bound is the larger of the
+//! between them is off by at most |du| (sqrt r - 1)/(sqrt r + 1). Along the top and the
+//! bottom of the tile, that bounds the error at the column's two ends, and a pixel between the ends
+//! gets a weighted mean of the two errors. Down the column the same formula applies once more, to
+//! the interpolation between the exact coordinates at these ends. So the bound is the larger of the
 //! errors of top and bottom, plus the column's own: a closed form, which is reached where the two
 //! have the same sign. Fixed point adds up to [`DRIFT`].
 //!

@@ -39,10 +39,10 @@
 //! # Lines
 //!
 //! All columns of a polygon have the same c', the change of c per pixel, and D is linear across the
-//! columns ([`crate::plane::bounds`] defines D and R). So an R computed from the larger |D| of the first
-//! and the last column serves all columns, and for most columns two multiplications then show that
-//! the column can be a line. Where they do not show it, or an end of the column is clamped, the
-//! column's own R decides.
+//! columns ([`crate::plane::bounds`] defines D and R). So an R computed from the larger |D| of the
+//! first and the last column serves all columns, and for most columns two multiplications then show
+//! that the column can be a line. Where they do not show it, or an end of the column is clamped,
+//! the column's own R decides.
 //!
 //! # Columns or rows
 //!
@@ -71,7 +71,8 @@ use modex::{HEIGHT, WIDTH};
 /// The assumed cost of making a piece of a row, in pieces of a column.
 pub const ROW: u32 = 2;
 
-/// The extent of a polygon: its bounding box on the screen, and the middle of its texture coordinates.
+/// The extent of a polygon: its bounding box on the screen, and the middle of its texture
+/// coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
     /// The part on the screen, in 1/256 pixel: left, top, right, bottom.
@@ -130,27 +131,27 @@ impl Extent {
         [(first(left), first(top)), (last(right), last(bottom))]
     }
 
-    /// Returns the limits (near, far) of the polygon's depths on the screen: no depth is above near
-    /// or below far. Returns nothing unless both are above zero. A depth is a value of the form c,
-    /// which is large near the eye.
+    /// Returns the limits (near, far) of the polygon's inverse depths on the screen: no value of
+    /// the form c is above near or below far. Returns nothing unless both are above zero.
     #[inline]
-    fn depths(&self, polygon: &[Vertex], c: &Form) -> Option<(i64, i64)> {
+    fn inverse_depths(&self, polygon: &[Vertex], c: &Form) -> Option<(i64, i64)> {
         let (mut near, mut far) = (i64::MIN, i64::MAX);
         self.corners(polygon, |x, y| {
             // With 8 more bits than at a pixel's centre.
-            let depth = c.origin * 256 + c.right * x + c.down * y;
-            near = near.max(depth);
-            far = far.min(depth);
+            let c = c.origin * 256 + c.right * x + c.down * y;
+            near = near.max(c);
+            far = far.min(c);
         });
         let (near, far) = ((near >> 8) + 1, far >> 8);
         (far > 0).then_some((near, far))
     }
 }
 
-/// Bits to which the nearest depth is reduced for an affine map. That moves a coordinate by less
-/// than 3 units of 2^-16 texel anywhere on the screen: each coefficient is off by less than one,
-/// which counts for at most 560 pixels (width and height) and 256 texels, and the middle depth is
-/// at least 2^32, so the coordinate moves by less than 256 x 560 / 2^32 texel.
+/// Bits to which the largest inverse depth is reduced for an affine map. That moves a coordinate by
+/// less than 3 units of 2^-16 texel anywhere on the screen: each coefficient is off by less than
+/// one, which counts for at most 560 pixels (width and height) and 256 texels, and the middle of
+/// the inverse depths is at least 2^32, so the coordinate moves by less than 256 x 560 / 2^32
+/// texel.
 const DEPTH_BITS: u32 = 34;
 
 /// Returns the affine map of a polygon, if the map keeps to `tolerance` everywhere in the polygon.
@@ -162,7 +163,7 @@ fn flat(
     texture: &Texture<'_>,
     tolerance: Tolerance,
 ) -> Option<AffineMap> {
-    // A face with smaller depths is seen at a glancing angle; it is not flat.
+    // A face with smaller inverse depths is seen at a glancing angle; it is not flat.
     let cut = (64 - DEPTH_BITS).checked_sub(near.leading_zeros())?;
     let over_middle = Reciprocal::new((near + far) >> 1 >> cut);
     // Half of the change of c, relative to the least c: 32 fraction bits.
@@ -266,15 +267,15 @@ impl Within {
     ) -> Self {
         let by = || {
             let extent = Extent::new(polygon)?;
-            let depths = extent.depths(polygon, &plane.c);
-            let flat = |depths| flat(polygon, &extent, depths, &plane, texture, tolerance);
-            if let Some(map) = depths.and_then(flat) {
+            let limits = extent.inverse_depths(polygon, &plane.c);
+            let flat = |limits| flat(polygon, &extent, limits, &plane, texture, tolerance);
+            if let Some(map) = limits.and_then(flat) {
                 return Some(By::Map(map));
             }
             if axis(polygon, &extent, &plane, tolerance) == Axis::Right {
                 return Some(By::Rows);
             }
-            let (near, _) = depths?;
+            let (near, _) = limits?;
             let [(left, top), (right, bottom)] = extent.pixels();
             let columns = [left, right].map(|x| PlaneStepper::new(&plane, Axis::Down, x, top));
             let tolerance = tolerance.units().saturating_sub((bottom - top).into());
@@ -351,14 +352,14 @@ fn axis(polygon: &[Vertex], extent: &Extent, plane: &Plane, tolerance: Tolerance
     // In 1/256 of the cost of a line's pixel.
     let cost = |axis: Axis, steps: u16, piece: u32, (x, y): (u16, u16)| {
         let stepper = PlaneStepper::new(plane, axis, x, y);
-        let (depth, exact) = (stepper.at[2], EXACT << 8);
-        if depth <= 0 {
+        let (c, exact) = (stepper.at[2], EXACT << 8);
+        if c <= 0 {
             return exact;
         }
-        let chords = Chords::new(&[stepper], depth, tolerance.units());
-        let depth = chords.cut(depth);
+        let chords = Chords::new(&[stepper], c, tolerance.units());
+        let near = chords.cut(c);
         let mut lengths = [steps].into_iter().chain(LENGTHS);
-        let length = lengths.find(|&length| !chords.is_short_of(length, depth));
+        let length = lengths.find(|&length| !chords.is_short_of(length, near));
         length.map_or(exact, |length| {
             let line = (1 << 8) + (piece << 8) / u32::from(length.min(steps).max(1));
             line.min(exact)

@@ -1,11 +1,11 @@
 //! Error bounds of the perspective approximations against the exact quotients: closed forms, in
 //! integers, rounded up.
 //!
-//! EdgeInterpolant a span, a texture coordinate is f = a / c, where a and c are linear in the pixel and
-//! change by a' and c' per pixel. (b / c is treated alike.) The slope of f is -D / c^2 with
-//! D = a c' - a' c, and D is the same at every pixel of the span. So one number, D, says how fast
-//! the texture coordinate changes, and c says how that speed varies. c is an inverse depth, so it
-//! is large near the eye: the worst error is always at the end where c is small, the far end.
+//! Along a span, a texture coordinate is f = a / c, where a and c are linear in the pixel
+//! and change by a' and c' per pixel. (b / c is treated alike.) The slope of f is -D / c^2 with D =
+//! a c' - a' c, and D is the same at every pixel of the span. So one number, D, says how fast the
+//! texture coordinate changes, and c says how that speed varies. c is an inverse depth, so it is
+//! large near the eye: the worst error is always at the end where c is small, the far end.
 //!
 //! # Linear
 //!
@@ -150,7 +150,8 @@ const fn lobe(s: u128, x: u128) -> u128 {
 /// The error bound of a span: the quantities that the closed forms depend on.
 #[derive(Clone, Copy, Debug)]
 pub struct SpanBound {
-    /// Coordinates at the span's two ends, as [`quotients`](super::reciprocal::quotients) returns them.
+    /// Coordinates at the span's two ends, as [`quotients`](super::reciprocal::quotients) returns
+    /// them.
     pub ends: [(i32, i32); 2],
     steps: u16,
     /// p: the change of the faster coordinate at the far end, in texels per pixel; 32 fraction
@@ -200,7 +201,8 @@ impl SpanBound {
         bound
     }
 
-    /// Returns a bound of a coordinate's error with linear [`Subdivision`], in units of 2^-16 texel.
+    /// Returns a bound of a coordinate's error with linear [`Subdivision`], in units of 2^-16
+    /// texel.
     pub fn linear(&self, pieces: Subdivision) -> u32 {
         let steps = pieces.longest(self.steps);
         let error = self.chord(2 * u64::from(steps));
@@ -208,13 +210,14 @@ impl SpanBound {
         error.min(self.most.into()) as u32
     }
 
-    /// Returns a bound of a coordinate's error with quadratic [`Subdivision`], in units of 2^-16 texel.
+    /// Returns a bound of a coordinate's error with quadratic [`Subdivision`], in units of 2^-16
+    /// texel.
     ///
     /// A piece that turns is drawn as two chords, so this bound covers them too (see
-    /// [`crate::mappers::quadratic`] for turning pieces, d and K). Where the depth ratio of the longest piece is
-    /// below 5/2, |K| is at most 6/7 |d|. Then only the rounding of the three quotients can make a
-    /// piece turn, and only when |d| is below 36 units; the two halves then are off by at most 2
-    /// units more.
+    /// [`crate::mappers::quadratic`] for turning pieces, d and K). Where the depth ratio of the
+    /// longest piece is below 5/2, |K| is at most 6/7 |d|. Then only the rounding of the three
+    /// quotients can make a piece turn, and only when |d| is below 36 units; the two halves then
+    /// are off by at most 2 units more.
     pub fn quadratic(&self, pieces: Subdivision) -> u32 {
         let steps = u64::from(pieces.longest(self.steps));
         let mut error = self.curve(steps);
@@ -271,22 +274,23 @@ impl SpanBound {
 /// Longest chord in steps: a row of the screen.
 const LONGEST: usize = modex::WIDTH - 1;
 
-/// The depths at which a chord keeps to a tolerance, for every length of the chord. "Depth" here is
-/// the value of the form c, an inverse depth: it is large near the eye.
+/// The inverse depths at which a chord keeps to a tolerance, for every length of the chord. They
+/// are values of the form c.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chords {
-    /// R, rounded up: 8 fraction bits, below 2^42, in units of 2^`shift` as all depths here.
+    /// R, rounded up: 8 fraction bits, below 2^42, in units of 2^`shift` as all inverse depths
+    /// here.
     root: u64,
-    /// Bits that are cut off depths, so that the nearest depth has at most 32 bits.
+    /// Bits that are cut off inverse depths, so that the largest has at most 32 bits.
     shift: u32,
     /// T in units of 2^-16 texel, less two units for the ends, which are rounded down.
     most: u32,
 }
 
 impl Chords {
-    /// Returns the permitted chords of spans along `steppers`, which share one c', for an error of at
-    /// most `tolerance` units of 2^-16 texel. `near` is the largest depth of any later query, and
-    /// is above zero.
+    /// Returns the permitted chords of spans along `steppers`, which share one c', for an error of
+    /// at most `tolerance` units of 2^-16 texel. `near` is the largest inverse depth of any later
+    /// query, and is above zero.
     #[inline]
     pub fn new(steppers: &[PlaneStepper], near: i64, tolerance: u32) -> Self {
         let shift = 32u32.saturating_sub(near.leading_zeros());
@@ -322,27 +326,27 @@ impl Chords {
         Self { root, shift, most }
     }
 
-    /// Returns a depth in units of 2^`shift`, rounded down.
+    /// Returns an inverse depth in units of 2^`shift`, rounded down.
     #[inline]
-    pub fn cut(&self, depth: i64) -> u64 {
-        (depth >> self.shift) as u64
+    pub fn cut(&self, c: i64) -> u64 {
+        (c >> self.shift) as u64
     }
 
-    /// Returns R n^(2/3) for n = `pixels`, rounded up: the least geometric mean of the depths at a
-    /// chord's ends.
+    /// Returns R n^(2/3) for n = `pixels`, rounded up: the least geometric mean of the inverse
+    /// depths at a chord's ends.
     #[inline]
     fn mean(&self, pixels: u16) -> u64 {
         ((self.root * POWERS[usize::from(pixels)]) >> 24) + u64::from(self.root > 0)
     }
 
-    /// Returns whether no depth up to `near` permits a chord over `pixels` pixels.
+    /// Returns whether no inverse depth up to `near` permits a chord over `pixels` pixels.
     #[inline]
     pub fn is_short_of(&self, pixels: u16, near: u64) -> bool {
         self.mean(pixels) > near
     }
 
-    /// Returns whether a chord may span the whole of `pixels` pixels along `stepper`. The test leaves
-    /// no room for the rounding of the steps or for clamped ends; [`Chords::least`] does.
+    /// Returns whether a chord may span the whole of `pixels` pixels along `stepper`. The test
+    /// leaves no room for the rounding of the steps or for clamped ends; [`Chords::least`] does.
     #[inline]
     pub fn keep(&self, stepper: &PlaneStepper, pixels: u16) -> bool {
         let (from, to) = (stepper.at[2], stepper.after(pixels)[2]);
@@ -351,9 +355,9 @@ impl Chords {
         is_legal && mean >> 32 == 0 && self.cut(from) * self.cut(to) >= mean * mean
     }
 
-    /// Returns the least product of the depths at the ends of a chord over `pixels` pixels, where
-    /// the ends are clamped by up to `outside` units. Returns [`u64::MAX`], which no product
-    /// reaches, if no depths suffice.
+    /// Returns the least product of the inverse depths at the ends of a chord over `pixels` pixels,
+    /// where the ends are clamped by up to `outside` units. Returns [`u64::MAX`], which no product
+    /// reaches, if no inverse depths suffice.
     #[inline]
     pub fn least(&self, pixels: u16, outside: u32) -> u64 {
         let spent = u64::from(pixels) + u64::from(outside);

@@ -65,11 +65,11 @@ impl Reciprocal {
     /// Returns n / c in 16.16 for 0 <= n < 256 c: at most the quotient, and less than 1 + 3/128
     /// units below it.
     ///
-    /// For a reciprocal of [`Reciprocal::new`]. With c' = c 2^zeros / 2^32 and n' = n 2^zeros / 2^40, the quotient is 2^24 n' / c', and n' <
-    /// c'. Three values are rounded down, and each rounding costs less than 2^-7 units: n' to a
-    /// whole number (value / 2^39), 1 / c' to at least 1 / (c' + 1) (2^24 / c'), and the reciprocal
-    /// to a whole number (n' / 2^39). Cutting off the fraction of the result then costs less than
-    /// one unit.
+    /// For a reciprocal of [`Reciprocal::new`]. With c' = c 2^zeros / 2^32 and n' = n 2^zeros /
+    /// 2^40, the quotient is 2^24 n' / c', and n' < c'. Three values are rounded down, and each
+    /// rounding costs less than 2^-7 units: n' to a whole number (value / 2^39), 1 / c' to at least
+    /// 1 / (c' + 1) (2^24 / c'), and the reciprocal to a whole number (n' / 2^39). Cutting off the
+    /// fraction of the result then costs less than one unit.
     #[inline]
     pub fn times(self, n: i64) -> i32 {
         let high = (n as u64) << (self.zeros - 8) >> 32;
