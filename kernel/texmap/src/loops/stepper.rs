@@ -94,7 +94,7 @@ impl UprightStepper {
 pub struct LineStepper {
     /// The texture coordinates, and their steps along the line.
     pub texture: AffineStepper,
-    /// The line's offset across its direction at the first pixel: [`LINE_FRACTION`] bits, 0 to 1.
+    /// The line's offset across its direction at the first pixel: 22 fraction bits, 0 to 1.
     pub offset: i32,
     /// The step of `offset`, -1 to 1.
     pub slope: i32,

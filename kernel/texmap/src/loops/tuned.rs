@@ -268,7 +268,7 @@ pub(super) fn shifts(texture: &Texture<'_>, stepper: AffineStepper, column: Colu
     shifts!(down, texture, stepper, column,);
 }
 
-/// Draws the whole eights of a column as [`shifts`] does.
+/// Draws the whole eights of a column as `shifts` does.
 #[inline(always)]
 pub(crate) fn shifts_eights(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     shifts!(eights, texture, stepper, column, spare = out(reg) _,);
@@ -414,13 +414,13 @@ pub(super) fn extract(texture: &Texture<'_>, stepper: AffineStepper, column: Col
     extract!(down, texture, stepper, column);
 }
 
-/// Draws the whole eights of a column as [`extract`] does.
+/// Draws the whole eights of a column as `extract` does.
 #[inline(always)]
 pub(crate) fn extract_eights(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     extract!(eights, texture, stepper, column);
 }
 
-/// Writes the texels of a row as [`extract`] does. The CPU must have BMI2.
+/// Writes the texels of a row as `extract` does. The CPU must have BMI2.
 #[inline(always)]
 pub(super) fn fill_row(texels: &[u8], joint: Joint, sink: impl PixelSink) {
     /// Compiled for a CPU with BMI2, together with the loop that fills `sink`.

@@ -297,7 +297,7 @@ impl AffineMap {
         }
     }
 
-    /// Returns the stepper down a span of [`spans`] or [`columns`](crate::scan::columns).
+    /// Returns the stepper down a span of [`spans()`] or [`columns`](crate::scan::columns).
     ///
     /// If the first or the last pixel lies outside the texture, which only rounding and the far
     /// border cause, both are clamped into it, and the step is computed from the clamped ends.

@@ -1,7 +1,7 @@
 //! The plane of a texture in space: this folder decides the exact texture coordinates of every
 //! pixel, and how far an approximation of them may be off.
 //!
-//! [`forms`] defines the coordinates. [`bounds`] is the one place for error bounds.
+//! [`Plane`] defines the coordinates. [`bounds`] is the one place for error bounds.
 
 pub mod bounds;
 pub(crate) mod face;
