@@ -13,8 +13,7 @@ use oracle::texel::{affine, perspective};
 use render::{RenderMemory, RenderOptions, SceneRenderer};
 use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
 use scene::{FOCAL_LENGTH, Pose};
-use texmap::loops::Loop;
-use texmap::{Face, Mapper, Point, Texture};
+use texmap::{Face, Loop, Mapper, Point, Texture};
 
 /// The affine mapper's coordinates are within 2^-7 texel of the exact coordinates: 2^-8 where a whole texture
 /// is squeezed into a sliver, and 240 steps, each rounded by less than 2^-16.

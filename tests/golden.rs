@@ -74,9 +74,9 @@ const BYTE_BY_BYTE: [&str; 11] = [
     // Tiles of 16 x 16 pixels.
     "mapper-tiles-16",
     // Lines of constant depth in any direction, through RAM.
-    "order-free-in-buffer",
+    "order-free-direction-in-buffer",
     // Columns of constant depth, on tiled textures with mipmaps, through RAM.
-    "corridor-level",
+    "corridor-constant-z",
     // Within a chosen error, on the knot, by planes.
     "knot-edge-on",
 ];

@@ -33,14 +33,14 @@ const MEMORY: &str = "boot/vga/src/memory.rs";
 const MONITOR: &str = "boot/vga/src/monitor.rs";
 const SCANOUT: &str = "boot/vga/src/scanout.rs";
 const SEQUENCER: &str = "boot/vga/src/sequencer.rs";
-const ADAPTIVE: &str = "kernel/texmap/src/adaptive.rs";
-const BOUNDS: &str = "kernel/texmap/src/bounds.rs";
-const COVERAGE: &str = "kernel/texmap/src/coverage.rs";
-const EXACT: &str = "kernel/texmap/src/exact.rs";
-const PLACES: &str = "kernel/texmap/src/places.rs";
-const RUNS: &str = "kernel/texmap/src/runs.rs";
-const VISIBLE: &str = "kernel/texmap/src/visible.rs";
-const WITHIN: &str = "kernel/texmap/src/within.rs";
+const ADAPTIVE: &str = "kernel/texmap/src/mappers/adaptive.rs";
+const BOUNDS: &str = "kernel/texmap/src/plane/bounds.rs";
+const EDGES: &str = "kernel/texmap/src/scan/edges.rs";
+const EXACT: &str = "kernel/texmap/src/mappers/exact.rs";
+const RECIPROCAL: &str = "kernel/texmap/src/plane/reciprocal.rs";
+const SINK: &str = "kernel/texmap/src/loops/sink.rs";
+const VISIBLE: &str = "kernel/texmap/src/scan/visible.rs";
+const WITHIN: &str = "kernel/texmap/src/mappers/within.rs";
 const VGA: &str = "boot/vga/src/vga.rs";
 const DRIVER: &str = "kernel/modex/src/driver.rs";
 const REGISTERS: &str = "kernel/modex/src/registers.rs";
@@ -184,29 +184,29 @@ const MUTANTS: &[Mutant] = &[
     mutant("faults forgotten with the card", VGA,
         "if !self.faults.is_empty() && ", "if false && "),
     // Coverage and the exact mapper.
-    mutant("less for less or equal in the edge rule", COVERAGE,
+    mutant("less for less or equal in the edge rule", EDGES,
         "tie: |_| true,", "tie: |_| false,"),
-    mutant("columns by the transposed rule", COVERAGE,
+    mutant("columns by the transposed rule", EDGES,
         "tie: |dy| dy <= 0,", "tie: |_| true,"),
-    mutant("level edges not past their own line", COVERAGE,
+    mutant("level edges not past their own line", EDGES,
         "tie: |dy| dy <= 0,", "tie: |dy| dy < 0,"),
-    mutant("a slope without its remainder", COVERAGE,
+    mutant("a slope without its remainder", EDGES,
         "step: up(dq),", "step: i64::from(dq.div_euclid(dp)) << FRACTION,"),
-    mutant("no pre-step to the first centre", COVERAGE,
+    mutant("no pre-step to the first centre", EDGES,
         "let p = offset(first, a.0);", "let p = 0 * offset(first, a.0);"),
-    mutant("an edge closed at its other end", COVERAGE,
+    mutant("an edge closed at its other end", EDGES,
         "let first = ((a + 127) >> 8)", "let first = ((a + 128) >> 8)"),
-    mutant("a run's end not guarded", EXACT,
+    mutant("a span's end not guarded", EXACT,
         "(0..len).find(needs_no_clamp).unwrap_or(len)", "(0..len).find(needs_no_clamp).unwrap_or(len).min(0)"),
     mutant("a quotient rounded", EXACT,
         "(a / c) as usize", "((a + c / 2) / c) as usize"),
     // Mappers within an error, and visibility.
     mutant("a line kept that errs too much", ADAPTIVE,
-        "depth > 0 && self.near * self.chords.cut(depth) >= self.least", "depth > 0"),
+        "c > 0 && self.near * self.chords.cut(c) >= self.least", "c > 0"),
     mutant("a clamped end not paid for", ADAPTIVE,
         "self.chords.least(steps, self.outside.max(there.1))", "self.chords.least(steps, 0)"),
     mutant("a line from its wrong end", ADAPTIVE,
-        "walk = walk.every(-1, i32::from(len) - 1);", "walk = walk.every(-1, i32::from(steps));"),
+        "stepper = stepper.every(-1, i32::from(len) - 1);", "stepper = stepper.every(-1, i32::from(steps));"),
     mutant("a pixel after the lines left out", ADAPTIVE,
         "let len = self.len - self.done;\n        if len == 0 {",
         "let len = self.len - self.done;\n        if len < 2 {"),
@@ -217,14 +217,14 @@ const MUTANTS: &[Mutant] = &[
         "let spent = u64::from(pixels) + u64::from(outside);", "let spent = u64::from(outside);"),
     mutant("the error of a line halved", BOUNDS,
         "exponent + more + 14 -", "exponent + more + 13 -"),
-    mutant("a map's bend not paid for", WITHIN,
-        "off = off.max(bent as i64 + outside + (change >> 28));",
+    mutant("a map's error not paid for", WITHIN,
+        "off = off.max(error as i64 + outside + (change >> 28));",
         "off = off.max(outside + (change >> 28));"),
     mutant("the dearer axis", WITHIN,
         "match rows < columns {", "match rows > columns {"),
-    mutant("a reciprocal not rounded down", RUNS,
+    mutant("a reciprocal not rounded down", RECIPROCAL,
         "value: (1 << 63) / (u64::from(high) + 1),", "value: (1 << 63) / u64::from(high),"),
-    mutant("the end of a row left out", PLACES,
+    mutant("the end of a row left out", SINK,
         "for x in 4 * to..end {", "for x in 4 * to + 1..end {"),
     mutant("the farther face before the nearer", VISIBLE,
         "at(self) * other.over > at(other) * self.over",

@@ -15,6 +15,7 @@ use protocol::{Content, FrameName, Lines, Motion, Word};
 
 use crate::indexed::IndexedImage;
 use system::quote::quoted;
+use texmap::Mapper;
 
 /// A dump: a VGA's palette, and the pixels of a page or of all video memory.
 #[derive(Clone, PartialEq, Eq)]
@@ -315,6 +316,10 @@ impl<'a> DumpReader<'a> {
         };
         let mapper = match self.line("mapper")? {
             "none" => None,
+            // Version 5 renamed some mappers.
+            old if version < 5 && Mapper::renamed(old).is_some() => {
+                Mapper::renamed(old).and_then(Word::new)
+            }
             name => Some(
                 Word::new(name)
                     .ok_or_else(|| format!("{} is not a mapper's name", quoted(name)))?,
@@ -486,6 +491,10 @@ mod tests {
         let mut lines = old_labels(dump().lines());
         lines[0] = format!("{MAGIC} 4");
         assert_eq!(Dump::from_lines(&ended(lines.clone())).unwrap(), dump());
+        let mut renamed = lines.clone();
+        renamed[4] = "mapper level".into();
+        let header = Dump::from_lines(&ended(renamed)).unwrap().header;
+        assert_eq!(header.mapper, Word::new("constant-z"));
         lines[0] = format!("{MAGIC} 5");
         let error = Dump::from_lines(&ended(lines)).unwrap_err();
         assert_eq!(error.line, 4);

@@ -76,6 +76,14 @@ impl TypedValueParser for Mappers {
         value: &OsStr,
     ) -> Result<Mapper, clap::Error> {
         let names = PossibleValuesParser::new(Mapper::ALL.iter().map(|(name, ..)| *name));
+        if let Some((old, new)) = value
+            .to_str()
+            .and_then(|old| Some((old, Mapper::renamed(old)?)))
+        {
+            system::say(format_args!(
+                "--mapper {old}: this mapper is now called '{new}'; the next version will not accept '{old}'"
+            ));
+        }
         match value.to_str().and_then(Mapper::parse) {
             Some(mapper) => Ok(mapper),
             None => Err(names

@@ -24,8 +24,7 @@ use anyhow::{Context, ensure};
 use clap::builder::PossibleValuesParser;
 use model::{Arena, ModelFile};
 use scene::catalogue::Entry;
-use texmap::loops::Loop;
-use texmap::{Mapper, Order};
+use texmap::{Loop, Mapper, Order};
 
 use crate::measure::{self, KernelFigures};
 use system::Progress;
@@ -72,7 +71,7 @@ const ALONG: [&str; 6] = [
 const BY_LENGTH: [&str; 8] = [
     "row-steps",
     "packed",
-    "two-steps",
+    "step-table",
     "shifts",
     "extract",
     "linear-16",

@@ -1,9 +1,8 @@
 //! A slanted face that fills the screen, so that nearly all work is in the inner loops.
 
 use modex::{HEIGHT, WIDTH};
-use texmap::coverage::Axis;
-use texmap::plane::{Anchor, Plane, Walk, coordinate};
-use texmap::{Face, SUBPIXELS, Texture, Vertex};
+use texmap::plane::{Anchor, Plane, PlaneStepper, coordinate};
+use texmap::{Axis, Face, SUBPIXELS, Texture, Vertex};
 
 /// Width and height of the texture.
 const SIDE: u16 = Texture::MAX_SIDE;
@@ -52,7 +51,7 @@ impl Screen {
         let polygon = corners.map(|(x, y)| {
             // Use the centre of the corner's pixel, half a pixel inwards.
             let pixel = (x.min(right - 1), y.min(bottom - 1));
-            let [a, b, c] = Walk::new(&plane, Axis::Down, pixel.0, pixel.1).at;
+            let [a, b, c] = PlaneStepper::new(&plane, Axis::Down, pixel.0, pixel.1).at;
             Vertex {
                 x: i32::from(x) * SUBPIXELS,
                 y: i32::from(y) * SUBPIXELS,

@@ -309,8 +309,8 @@ fn a_split_view_shows_the_same_part_three_times() {
             "shifts",
             "row-multiply",
             "row-passes",
-            "free",
-            "nearer",
+            "free-direction",
+            "row-or-column",
             "exact",
         ] {
             carry_out(&mut demo, &format!("mapper {mapper}"), 0);

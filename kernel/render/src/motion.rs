@@ -33,9 +33,9 @@
 use modex::{HEIGHT, Palette, WIDTH};
 use scene::trig::sin;
 use scene::{FOCAL_LENGTH, Pose};
-use texmap::Texture;
-use texmap::coverage::{Axis, spans};
 use texmap::plane::{Plane, coordinate};
+use texmap::scan::spans;
+use texmap::{Axis, Texture};
 
 use crate::PosedScene;
 use crate::quality::PoseChange;

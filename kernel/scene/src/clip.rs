@@ -270,8 +270,8 @@ mod tests {
     use crate::MAX_CORNERS;
     use std::vec;
     use std::vec::Vec;
-    use texmap::affine::Sides;
-    use texmap::{Texture, coverage};
+    use texmap::mappers::affine::Sides;
+    use texmap::{Texture, scan};
 
     const SIDE: i32 = 256 << 16;
 
@@ -296,8 +296,8 @@ mod tests {
         let texels = vec![0; 1 << 16];
         let texture = Texture::new(&texels, 256, 256).unwrap();
         let mut pixels = vec![false; WIDTH * HEIGHT];
-        let legal = Sides::new(polygon, &texture, coverage::Axis::Down).and_then(|_| {
-            coverage::columns(polygon, |run| {
+        let legal = Sides::new(polygon, &texture, texmap::Axis::Down).and_then(|_| {
+            scan::columns(polygon, |run| {
                 for y in run.first..run.first + run.len {
                     pixels[usize::from(y) * WIDTH + usize::from(run.line)] ^= true;
                 }

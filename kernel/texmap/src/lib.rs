@@ -1,7 +1,7 @@
-//! Texture mapping by columns: coverage, mappers, jobs, and the renderer that draws the jobs.
+//! Texture mapping by columns: polygons to pixels.
 //!
-//! Drawing has two steps. First, a [`Mapper`] turns a face into jobs: [`coverage`] finds the pixels
-//! of each screen column that lie inside the face's polygon, and the mapper adds the texture
+//! Drawing has two steps. First, a [`Mapper`] turns a face into jobs: the [scan] finds the spans of
+//! pixels in each screen column that lie inside the face's polygon, and the mapper adds the texture
 //! coordinates at the first of these pixels and the steps to the next. Then a [`Renderer`] draws
 //! the jobs in the chosen [`Order`], through a [`modex::Destination`]. The code that draws a job
 //! sees one span of pixels; it depends neither on the order of the jobs nor on what lies behind the
@@ -9,34 +9,56 @@
 //!
 //! Integers decide pixels: coverage is exact, and everything else is fixed point with a range that
 //! is stated where the type is defined. So the host and the bare machine produce the same bits.
+//!
+//! A folder uses only the folders before it: [`geometry`], [`plane`], [`scan`], [`loops`],
+//! [`mappers`], [`draw`].
+//!
+//! # Example
+//!
+//! ```
+//! use modex::PlanarBuffer;
+//! use texmap::plane::Anchor;
+//! use texmap::{Face, JobList, Mapper, Order, Renderer, Texture, Vertex};
+//!
+//! let textures = [Texture::new(&[7; 16], 4, 4)?];
+//! // Positions in pixels and coordinates in texels, as fixed point.
+//! let corner = |x: i32, y: i32, u: i32, v: i32| Vertex {
+//!     x: x << 8,
+//!     y: y << 8,
+//!     u: u << 16,
+//!     v: v << 16,
+//! };
+//! let face = Face {
+//!     polygon: &[corner(10, 10, 0, 0), corner(90, 10, 4, 0), corner(10, 90, 0, 4)],
+//!     texture: 0,
+//!     // Affine mappers, such as the default, use no anchors.
+//!     anchors: [Anchor::default(); 3],
+//!     focal_length: 258,
+//! };
+//! let mut page = PlanarBuffer::new();
+//! let mut jobs = JobList::<256>::new();
+//! let (mapper, order) = (Mapper::default(), Order::default());
+//! let mut renderer = Renderer::new(&mut jobs, &textures, &mut page, mapper, order);
+//! renderer.face(&face);
+//! assert_eq!(renderer.finish().polygons, 1);
+//! assert_eq!((page.pixel(20, 20), page.pixel(80, 80)), (7, 0));
+//! # Ok::<(), texmap::TextureError>(())
+//! ```
 #![no_std]
 #![deny(unsafe_code)]
 
-pub mod adaptive;
-pub mod affine;
-mod along;
-pub mod bounds;
-pub mod coverage;
-pub mod exact;
-pub mod free;
-mod job;
-pub mod level;
+pub mod draw;
+pub mod geometry;
 pub mod loops;
-mod mapper;
-mod places;
+pub mod mappers;
 pub mod plane;
-mod polygon;
-mod renderer;
-pub mod runs;
-mod straight;
-pub mod tiles;
-pub mod visible;
-pub mod within;
+pub mod scan;
 
-pub use job::{Job, JobList, Rows, Style, Walk};
-pub use mapper::{Face, Mapper};
-pub use plane::Plane;
-pub use polygon::{MAX_COORDINATE, MAX_SIDES, Point, SUBPIXELS, Texture, TextureError, Vertex};
-pub use renderer::{Order, Renderer, Stats};
-pub use visible::Visible;
-pub use within::Tolerance;
+pub use draw::{Job, JobList, Order, Renderer, Stats};
+pub use geometry::{
+    Axis, Dropped, MAX_COORDINATE, MAX_SIDES, Point, SUBPIXELS, Texture, TextureError, Vertex,
+};
+pub use loops::{AffineStepper, Loop, Rows, Style};
+pub use mappers::{Mapper, SpanKind};
+pub use plane::{Face, Plane, PlaneStepper, Subdivision, Tolerance};
+pub use scan::Visible;

@@ -3,50 +3,50 @@
 
 use std::collections::HashMap;
 
-use texmap::affine::{Map, Sides, Walk};
-use texmap::coverage::{self, Axis, Dropped, Run};
-use texmap::{Texture, Vertex};
+use texmap::mappers::affine::{AffineMap, Sides};
+use texmap::scan::{self, Span};
+use texmap::{AffineStepper, Axis, Dropped, Texture, Vertex};
 
 /// Makes the walk down a span.
-type Walker = Box<dyn Fn(&Run) -> Walk>;
+type Walker = Box<dyn Fn(&Span) -> AffineStepper>;
 /// Makes a polygon's walker; `None` if the rule does not apply to the polygon.
 type Rule = fn(&[Vertex], &Texture<'_>) -> Option<Walker>;
 
 fn by_sides(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
     let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
-    Some(Box::new(move |run| sides.walk(run)))
+    Some(Box::new(move |span| sides.stepper(span)))
 }
 
 fn by_half_steps(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
     let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
-    Some(Box::new(move |run| sides.half_step(run)))
+    Some(Box::new(move |span| sides.half_step(span)))
 }
 
 fn by_map(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
-    let map = Map::new(polygon, texture)?;
-    Some(Box::new(move |run| map.walk(run)))
+    let map = AffineMap::new(polygon, texture)?;
+    Some(Box::new(move |span| map.stepper(span)))
 }
 
-fn walks(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Run, Walk)> {
-    let mut walks = Vec::new();
-    if let Some(walk) = rule(polygon, texture) {
-        coverage::columns(polygon, |run| walks.push((run, walk(&run)))).unwrap();
+fn steppers(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Span, AffineStepper)> {
+    let mut steppers = Vec::new();
+    if let Some(stepper) = rule(polygon, texture) {
+        scan::columns(polygon, |span| steppers.push((span, stepper(&span)))).unwrap();
     }
-    walks
+    steppers
 }
 
 /// Pixels of `polygon`, each with its coordinates; panics on a coordinate outside the texture.
 fn drawn(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> HashMap<(i32, i32), (i32, i32)> {
     let (last_u, last_v) = texture.last();
     let mut pixels = HashMap::new();
-    for (run, walk) in walks(polygon, texture, rule) {
-        for i in 0..i32::from(run.len) {
-            let (u, v) = (walk.u + i * walk.du, walk.v + i * walk.dv);
+    for (span, stepper) in steppers(polygon, texture, rule) {
+        for i in 0..i32::from(span.len) {
+            let (u, v) = (stepper.u + i * stepper.du, stepper.v + i * stepper.dv);
             assert!(
                 (0..=last_u).contains(&u) && (0..=last_v).contains(&v),
-                "{run:?} {walk:?} row {i} of {polygon:?}"
+                "{span:?} {stepper:?} row {i} of {polygon:?}"
             );
-            pixels.insert((i32::from(run.line), i32::from(run.first) + i), (u, v));
+            pixels.insert((i32::from(span.line), i32::from(span.first) + i), (u, v));
         }
     }
     pixels
@@ -139,8 +139,9 @@ fn a_triangle_has_its_one_affine_map() {
         );
         // 1/128 texel: 2^-8 where a texture is squeezed into a sliver, and 60 pixels of step, each rounded by
         // less than 2^-16. A map adds only 3 2^-16 to the steps' error.
-        let walks = sides.into_iter().map(|at| (0, at, 512));
-        for (rule, ((x, y), (u, v)), bound) in walks.chain(map.into_iter().map(|at| (1, at, 63))) {
+        let steppers = sides.into_iter().map(|at| (0, at, 512));
+        for (rule, ((x, y), (u, v)), bound) in steppers.chain(map.into_iter().map(|at| (1, at, 63)))
+        {
             let (dx, dy) = (
                 i128::from(x) * 256 + 128 - a[0],
                 i128::from(y) * 256 + 128 - a[1],
@@ -218,8 +219,8 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
 fn a_map_holds_at_the_ends_of_its_range() {
     let texels = vec![0; 256 * 256];
     let texture = Texture::new(&texels, 256, 256).unwrap();
-    let (left, top) = (160 * 256 - Map::REACH, 120 * 256 - Map::REACH);
-    let (right, bottom) = (left + 2 * Map::REACH, top + 2 * Map::REACH);
+    let (left, top) = (160 * 256 - AffineMap::REACH, 120 * 256 - AffineMap::REACH);
+    let (right, bottom) = (left + 2 * AffineMap::REACH, top + 2 * AffineMap::REACH);
     let side = 256 << 16;
     let triangle =
         |corners: [(i32, i32, i32, i32); 3]| corners.map(|(x, y, u, v)| Vertex { x, y, u, v });

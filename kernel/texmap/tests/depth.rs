@@ -4,17 +4,21 @@
 
 mod faces;
 
-use texmap::coverage::Axis;
+use texmap::mappers::{constant_z, free_direction, tiles};
 use texmap::plane::{Anchor, Form, Plane};
-use texmap::runs::Pieces;
-use texmap::{Face, Job, Mapper, Texture, Vertex, Walk, free, level, tiles};
+use texmap::{Axis, Face, Job, Mapper, SpanKind, Subdivision, Texture, Vertex};
 
 use faces::*;
 
 const SIZE: (u16, u16) = (256, 200);
 /// A quarter of a texel, 16.16: errors that do not come from fixed point.
 const QUARTER: f64 = 16384.0;
-const MAPPERS: [Mapper; 4] = [Mapper::Level, Mapper::Free, Mapper::Nearer, Mapper::Tiles];
+const MAPPERS: [Mapper; 4] = [
+    Mapper::ConstantZ,
+    Mapper::FreeDirection,
+    Mapper::RowOrColumn,
+    Mapper::Tiles,
+];
 
 /// A visible triangle: its corners on the screen and in space.
 struct Triangle {
@@ -173,29 +177,29 @@ fn a_wall_and_a_floor_are_exact_but_for_drift() {
             triangle = triangle.through_windows(&mut random);
         }
         let expected = if wall { Axis::Down } else { Axis::Right };
-        assert_eq!(level::axis(&triangle.face().plane()), Some(expected));
+        assert_eq!(constant_z::axis(&triangle.face().plane()), Some(expected));
         let texels = [0; 256 * 200];
         let texture = Texture::new(&texels, SIZE.0, SIZE.1).unwrap();
-        for job in jobs(Mapper::Level, &triangle.face(), &texture) {
+        for job in jobs(Mapper::ConstantZ, &triangle.face(), &texture) {
             assert_eq!(job.axis, expected);
-            match job.walk {
-                Walk::Wall(_) => walls += 1,
-                Walk::Affine(walk) => {
+            match job.kind {
+                SpanKind::Upright(_) => walls += 1,
+                SpanKind::Affine(stepper) => {
                     affine += 1;
-                    assert!(!(wall && upright), "{walk:?} steps both");
+                    assert!(!(wall && upright), "{stepper:?} steps both");
                 }
                 // A window may show points beyond the horizon.
                 _ => exact += u32::from(case % 5 != 0),
             }
         }
-        let (more, most) = compare(Mapper::Level, 20.0, &triangle, |_, _, _, (x, y), _| {
+        let (more, most) = compare(Mapper::ConstantZ, 20.0, &triangle, |_, _, _, (x, y), _| {
             // A span's pixels are counted before it is cut: never more than this.
-            Some(f64::from(level::drift(if wall { y } else { x })))
+            Some(f64::from(constant_z::drift(if wall { y } else { x })))
         });
         (pixels, worst) = (pixels + more, worst.max(most));
     }
     println!("{pixels} coordinates, {worst:.3} of the bound at worst");
-    println!("{walls} walls, {affine} affine and {exact} exact runs");
+    println!("{walls} walls, {affine} affine and {exact} exact spans");
     if seeded::is_whole() {
         assert!(pixels > 500_000 && worst > 0.8 && walls > 2_000 && affine > 5_000);
         // Hardly any of a wall's visible spans are left to the exact mapper.
@@ -211,8 +215,8 @@ fn where_no_depth_is_constant_level_is_exact() {
     let mut planes = 0;
     for _ in 0..50 {
         let triangle = Triangle::any(&mut random, 3.0);
-        if level::axis(&triangle.face().plane()).is_none() {
-            let level = jobs(Mapper::Level, &triangle.face(), &texture);
+        if constant_z::axis(&triangle.face().plane()).is_none() {
+            let level = jobs(Mapper::ConstantZ, &triangle.face(), &texture);
             assert_eq!(level, jobs(Mapper::Exact, &triangle.face(), &texture));
             planes += 1;
         }
@@ -220,7 +224,7 @@ fn where_no_depth_is_constant_level_is_exact() {
     assert!(planes > 40);
 }
 
-/// How far u or v moves when the point moves by [`free::ASIDE`] across the line.
+/// How far u or v moves when the point moves by [`free_direction::LARGEST_DISTANCE`] across the line.
 fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64> {
     let (x, y) = (f64::from(x), f64::from(y));
     let here = quotient(plane, k, x, y)?;
@@ -228,7 +232,7 @@ fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64
         Axis::Right => quotient(plane, k, x, y + by),
         Axis::Down => quotient(plane, k, x + by, y),
     };
-    let aside = f64::from(free::ASIDE) / 16384.0;
+    let aside = f64::from(free_direction::LARGEST_DISTANCE) / 16384.0;
     let [one, other] = [moved(-aside)?, moved(aside)?];
     Some((one - here).abs().max((other - here).abs()))
 }
@@ -247,19 +251,18 @@ fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewher
         let axis = if right { Axis::Right } else { Axis::Down };
         let falls = (plane.c.right < 0) == (plane.c.down < 0);
         ways[2 * usize::from(right) + usize::from(falls)] += 1;
-        let (more, most) =
-            compare(
-                Mapper::Free,
-                QUARTER,
-                &triangle,
-                |plane, job, k, at, _| match job.walk {
-                    Walk::Free(_) => {
-                        assert_eq!(job.axis, axis);
-                        Some(across(plane, axis, k, at)? + f64::from(level::drift(320)))
-                    }
-                    _ => Some(1.0),
-                },
-            );
+        let (more, most) = compare(
+            Mapper::FreeDirection,
+            QUARTER,
+            &triangle,
+            |plane, job, k, at, _| match job.kind {
+                SpanKind::FreeDirection(_) => {
+                    assert_eq!(job.axis, axis);
+                    Some(across(plane, axis, k, at)? + f64::from(constant_z::drift(320)))
+                }
+                _ => Some(1.0),
+            },
+        );
         let worst = &mut worst[usize::from(right)];
         (pixels, *worst) = (pixels + more, worst.max(most));
     }
@@ -277,9 +280,12 @@ fn a_free_line_without_slope_goes_through_the_centres() {
     let mut random = seeded::generator();
     for case in 0..100 {
         let triangle = level_triangle(&mut random, case % 2 == 0, false);
-        compare(Mapper::Free, QUARTER, &triangle, |_, _, _, _, _| {
-            Some(f64::from(level::drift(320)))
-        });
+        compare(
+            Mapper::FreeDirection,
+            QUARTER,
+            &triangle,
+            |_, _, _, _, _| Some(f64::from(constant_z::drift(320))),
+        );
     }
 }
 
@@ -306,8 +312,8 @@ fn tiles_are_off_by_what_their_edge_and_their_column_are_and_by_that_somewhere()
         let texture = Texture::new(&texels, SIZE.0, SIZE.1).unwrap();
         for job in jobs(Mapper::Tiles, &triangle.face(), &texture) {
             assert_eq!(job.y / tiles::SIDE, (job.y + job.len - 1) / tiles::SIDE);
-            match job.walk {
-                Walk::Affine(_) => affine += u32::from(job.len),
+            match job.kind {
+                SpanKind::Affine(_) => affine += u32::from(job.len),
                 _ => exact += u32::from(job.len),
             }
         }
@@ -316,7 +322,7 @@ fn tiles_are_off_by_what_their_edge_and_their_column_are_and_by_that_somewhere()
             QUARTER,
             &triangle,
             |plane, job, k, (x, y), _| {
-                if !matches!(job.walk, Walk::Affine(_)) {
+                if !matches!(job.kind, SpanKind::Affine(_)) {
                     return Some(1.0);
                 }
                 let side = f64::from(tiles::SIDE);
@@ -359,13 +365,13 @@ fn nearer_goes_the_way_in_which_depth_changes_less() {
         let c = face.plane().c;
         let rows = c.right.abs() < c.down.abs();
         ways[usize::from(rows)] += 1;
-        for job in jobs(Mapper::Nearer, &face, &texture) {
+        for job in jobs(Mapper::RowOrColumn, &face, &texture) {
             assert_eq!(job.axis == Axis::Right, rows);
-            let Walk::Linear(walk, Pieces::Of(16)) = job.walk else {
+            let SpanKind::Linear(stepper, Subdivision::Of(16)) = job.kind else {
                 panic!("{job:?}");
             };
             let step = if rows { c.right } else { c.down };
-            assert_eq!((walk.at[2], walk.step[2]), (c.at(job.x, job.y), step));
+            assert_eq!((stepper.at[2], stepper.step[2]), (c.at(job.x, job.y), step));
         }
     }
     assert!(ways.iter().all(|&ways| ways > 40), "{ways:?}");

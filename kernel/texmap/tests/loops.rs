@@ -5,19 +5,17 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::NonNull;
 
 use modex::{Column, Destination, HEIGHT, Lane, PlanarBuffer, STRIDE, WIDTH};
-use texmap::affine::Walk;
-use texmap::loops::Loop;
 use texmap::plane::Anchor;
-use texmap::{Face, Mapper, Texture, Vertex};
+use texmap::{AffineStepper, Face, Loop, Mapper, Texture, Vertex};
 
 /// No texel has this colour: pixels that are not drawn keep it.
 const UNTOUCHED: u8 = 0;
 
 /// The loops that wrap any walk around.
-const MASKED: [Loop; 3] = [Loop::Shifts, Loop::Joined, Loop::Extract];
+const MASKED: [Loop; 3] = [Loop::Shifts, Loop::OneAccumulator, Loop::Extract];
 
 /// Draws a column, with tuned instructions or portably.
-type Draw = fn(Loop, &Texture<'_>, Walk, Column<'_>);
+type Draw = fn(Loop, &Texture<'_>, AffineStepper, Column<'_>);
 const DRAWS: [(&str, Draw); 2] = [("column", Loop::column), ("portable", Loop::portable)];
 
 fn texels(random: &mut fastrand::Rng, len: usize) -> Vec<u8> {
@@ -77,30 +75,30 @@ fn legal(random: &mut fastrand::Rng, size: u16, len: u16) -> (i32, i32) {
     }
 }
 
-fn is_legal(walk: Walk, len: u16, texture: &Texture<'_>) -> bool {
+fn is_legal(stepper: AffineStepper, len: u16, texture: &Texture<'_>) -> bool {
     let (last_u, last_v) = texture.last();
     let inside = |at: i32, step: i32, last: i32| {
         let end = i64::from(at) + i64::from(step) * i64::from(len - 1);
         (0..=last).contains(&at) && (0..=i64::from(last)).contains(&end)
     };
-    inside(walk.u, walk.du, last_u) && inside(walk.v, walk.dv, last_v)
+    inside(stepper.u, stepper.du, last_u) && inside(stepper.v, stepper.dv, last_v)
 }
 
-fn legal_walk(random: &mut fastrand::Rng, texture: &Texture<'_>, len: u16) -> Walk {
+fn legal_walk(random: &mut fastrand::Rng, texture: &Texture<'_>, len: u16) -> AffineStepper {
     loop {
         let (u, du) = legal(random, texture.width(), len);
         let (v, dv) = legal(random, texture.height(), len);
-        let walk = Walk { u, v, du, dv };
-        if is_legal(walk, len, texture) {
-            return walk;
+        let stepper = AffineStepper { u, v, du, dv };
+        if is_legal(stepper, len, texture) {
+            return stepper;
         }
     }
 }
 
 /// The texel of pixel `i`, from the definition; coordinates outside wrap around the padded sides.
-fn texel(texture: &Texture<'_>, walk: Walk, i: usize) -> u8 {
+fn texel(texture: &Texture<'_>, stepper: AffineStepper, i: usize) -> u8 {
     let at = |at: i32, step: i32| (i64::from(at) + i as i64 * i64::from(step)) >> 16;
-    let (column, row) = (at(walk.u, walk.du), at(walk.v, walk.dv));
+    let (column, row) = (at(stepper.u, stepper.du), at(stepper.v, stepper.dv));
     let pitch = usize::from(texture.pitch());
     let rows = texture.texels().len() / pitch;
     let [column, row] =
@@ -113,7 +111,7 @@ fn check(
     draw: (&str, Draw),
     by: Loop,
     texture: &Texture<'_>,
-    walk: Walk,
+    stepper: AffineStepper,
     len: u16,
     page: &mut Page,
 ) {
@@ -122,8 +120,8 @@ fn check(
         drawn,
         expected,
     } = page;
-    drawn.column(*x, *y, len, |column| draw.1(by, texture, walk, column));
-    let taken = by.walk(walk);
+    drawn.column(*x, *y, len, |column| draw.1(by, texture, stepper, column));
+    let taken = by.effective(stepper);
     for i in 0..usize::from(len) {
         let at = (usize::from(*y) + i) * STRIDE + usize::from(*x) / 4;
         expected.planes[usize::from(*x & 3)][at] = texel(texture, taken, i);
@@ -133,7 +131,7 @@ fn check(
             .map(|i| (i % WIDTH, i / WIDTH))
             .filter(|&(x, y)| drawn.pixel(x, y) != expected.pixel(x, y));
         panic!(
-            "{} {by:?}, {len} pixels from ({x}, {y}), {walk:?}, {} x {} texels, pitch {}: wrong at {:?}",
+            "{} {by:?}, {len} pixels from ({x}, {y}), {stepper:?}, {} x {} texels, pitch {}: wrong at {:?}",
             draw.0,
             texture.width(),
             texture.height(),
@@ -187,10 +185,10 @@ fn every_loop_draws_its_clear_twin() {
         };
         let size = (side(random), side(random));
         let texture = texture(&texels, size, random.bool());
-        let walk = legal_walk(random, &texture, len);
+        let stepper = legal_walk(random, &texture, len);
         for by in Loop::ALL {
             for draw in DRAWS {
-                check(draw, by, &texture, walk, len, page.anywhere(random, len));
+                check(draw, by, &texture, stepper, len, page.anywhere(random, len));
             }
         }
     }
@@ -219,7 +217,7 @@ fn a_negative_whole_step_carries_nothing() {
                 if !fraction {
                     (u, v) = (u & !0xFFFF, v & !0xFFFF);
                 }
-                let walk = Walk {
+                let stepper = AffineStepper {
                     u,
                     v,
                     du: du << 16,
@@ -228,7 +226,7 @@ fn a_negative_whole_step_carries_nothing() {
                 for by in Loop::ALL {
                     for draw in DRAWS {
                         page.place = (0, 0);
-                        check(draw, by, &texture, walk, len, &mut page);
+                        check(draw, by, &texture, stepper, len, &mut page);
                     }
                 }
             }
@@ -252,7 +250,7 @@ fn masked_loops_wrap_any_walk_around_the_padding() {
             2 => [i32::MIN, i32::MAX, -1, 0, 1][random.usize(..5)],
             _ => random.i32(..),
         };
-        let walk = Walk {
+        let stepper = AffineStepper {
             u: any(),
             v: any(),
             du: any(),
@@ -260,7 +258,7 @@ fn masked_loops_wrap_any_walk_around_the_padding() {
         };
         for by in MASKED {
             for draw in DRAWS {
-                check(draw, by, &texture, walk, len, page.anywhere(random, len));
+                check(draw, by, &texture, stepper, len, page.anywhere(random, len));
             }
         }
     }
@@ -273,23 +271,23 @@ fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
     for case in 0..seeded::cases(200) {
         let texture = texture(&texels, (side(random), side(random)), random.bool());
         let len = random.u16(2..=240);
-        let mut walk = legal_walk(random, &texture, len);
+        let mut stepper = legal_walk(random, &texture, len);
         let (last_u, last_v) = texture.last();
         // One bit outside, at the first pixel or at the last; or far away.
         match case % 8 {
-            0 => (walk.u, walk.du) = (-1, 1),
-            1 => (walk.u, walk.du) = (last_u + 1, -1),
-            2 => (walk.u, walk.du) = (i32::from(len) - 2, -1),
-            3 => (walk.u, walk.du) = (last_u - i32::from(len) + 2, 1),
-            4 => (walk.v, walk.dv) = (-2, 2),
-            5 => (walk.v, walk.dv) = (last_v + 1, -2),
-            6 => walk.dv = i32::MIN,
-            _ => walk.du = i32::MAX,
+            0 => (stepper.u, stepper.du) = (-1, 1),
+            1 => (stepper.u, stepper.du) = (last_u + 1, -1),
+            2 => (stepper.u, stepper.du) = (i32::from(len) - 2, -1),
+            3 => (stepper.u, stepper.du) = (last_u - i32::from(len) + 2, 1),
+            4 => (stepper.v, stepper.dv) = (-2, 2),
+            5 => (stepper.v, stepper.dv) = (last_v + 1, -2),
+            6 => stepper.dv = i32::MIN,
+            _ => stepper.du = i32::MAX,
         }
         for by in [
             Loop::TwoCarries,
             Loop::Packed,
-            Loop::TwoSteps,
+            Loop::StepTable,
             Loop::AddCarry,
         ] {
             if by == Loop::AddCarry && texture.bits().is_none() {
@@ -298,10 +296,13 @@ fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
             for (name, draw) in DRAWS {
                 let mut page = PlanarBuffer::new();
                 let outside = catch_unwind(AssertUnwindSafe(|| {
-                    page.column(0, 0, len, |column| draw(by, &texture, walk, column));
+                    page.column(0, 0, len, |column| draw(by, &texture, stepper, column));
                 }));
-                assert!(outside.is_err(), "{name} {by:?} {walk:?} {len}");
-                assert!(page == PlanarBuffer::new(), "{name} {by:?} {walk:?} {len}");
+                assert!(outside.is_err(), "{name} {by:?} {stepper:?} {len}");
+                assert!(
+                    page == PlanarBuffer::new(),
+                    "{name} {by:?} {stepper:?} {len}"
+                );
             }
         }
     }
@@ -317,29 +318,32 @@ fn a_packed_walk_drifts_within_its_bound() {
     for _ in 0..20_000 {
         let len = random.u16(1..=240);
         let texture = texture(&texels, (side(random), side(random)), false);
-        let walk = legal_walk(random, &texture, len);
-        let packed = Loop::Packed.walk(walk);
-        assert!(is_legal(packed, len, &texture), "{walk:?} {packed:?} {len}");
-        assert_eq!(packed, Loop::Packed.walk(packed));
-        assert_eq!((packed.u, packed.du), (walk.u, walk.du));
+        let stepper = legal_walk(random, &texture, len);
+        let packed = Loop::Packed.effective(stepper);
+        assert!(
+            is_legal(packed, len, &texture),
+            "{stepper:?} {packed:?} {len}"
+        );
+        assert_eq!(packed, Loop::Packed.effective(packed));
+        assert_eq!((packed.u, packed.du), (stepper.u, stepper.du));
         let last = i32::from(len) - 1;
         for i in [0, last / 2, last] {
-            let off = i64::from(walk.v - packed.v)
-                + i64::from(i) * (i64::from(walk.dv) - i64::from(packed.dv));
-            assert!(off.abs() <= i64::from(i) + 1, "{walk:?} {packed:?} {i}");
+            let off = i64::from(stepper.v - packed.v)
+                + i64::from(i) * (i64::from(stepper.dv) - i64::from(packed.dv));
+            assert!(off.abs() <= i64::from(i) + 1, "{stepper:?} {packed:?} {i}");
             worst = worst.max(off.abs());
         }
     }
     // The walk does drift, so the reference implementation has to know about it.
     assert!(worst > 200, "{worst}");
     for by in Loop::ALL {
-        let walk = Walk {
+        let stepper = AffineStepper {
             u: 1,
             v: 1,
             du: -1,
             dv: -1,
         };
-        assert_eq!(by.walk(walk) != walk, by == Loop::Packed);
+        assert_eq!(by.effective(stepper) != stepper, by == Loop::Packed);
     }
 }
 
@@ -362,19 +366,19 @@ fn the_longest_column_spills_nothing() {
         (last, -1, last, -1),
         (last, last, 0, -1),
     ] {
-        let walk = Walk { u, v, du, dv };
+        let stepper = AffineStepper { u, v, du, dv };
         for by in Loop::ALL {
-            if !is_legal(walk, len, &texture) && !MASKED.contains(&by) {
+            if !is_legal(stepper, len, &texture) && !MASKED.contains(&by) {
                 continue;
             }
             for (name, draw) in DRAWS {
                 let base = NonNull::from(&mut bytes[..]).cast();
                 // SAFETY: `bytes` has STRIDE bytes for every pixel, and nothing else accesses it.
-                draw(by, &texture, walk, unsafe { Lane::new(base, len) });
-                let taken = by.walk(walk);
+                draw(by, &texture, stepper, unsafe { Lane::new(base, len) });
+                let taken = by.effective(stepper);
                 for i in 0..usize::from(len) {
                     let expected = texel(&texture, taken, i);
-                    assert_eq!(bytes[i * STRIDE], expected, "{name} {by:?} {walk:?} {i}");
+                    assert_eq!(bytes[i * STRIDE], expected, "{name} {by:?} {stepper:?} {i}");
                 }
             }
         }
@@ -403,7 +407,7 @@ fn an_empty_column_is_not_drawn() {
         for (_, draw) in DRAWS {
             // SAFETY: the lane has no pixels.
             let none = unsafe { Lane::new(NonNull::from(&mut byte), 0) };
-            draw(by, &Texture::DOT, Walk::default(), none);
+            draw(by, &Texture::DOT, AffineStepper::default(), none);
         }
     }
     assert_eq!(byte, UNTOUCHED);

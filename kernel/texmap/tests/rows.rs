@@ -2,9 +2,9 @@
 
 mod faces;
 
-use texmap::affine::Sides;
-use texmap::coverage::{self, Axis};
-use texmap::{Face, Mapper, Rows, Texture, Vertex};
+use texmap::mappers::affine::Sides;
+use texmap::scan;
+use texmap::{Axis, Face, Mapper, Rows, Texture, Vertex};
 
 use faces::*;
 
@@ -28,19 +28,19 @@ fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
         };
         let mut writes = [0; 3];
         let mut pixels = 0;
-        coverage::rows(&polygon, |run| {
-            pixels += u64::from(run.len);
-            writes[2] += u64::from(run.len.min(4));
-            one += u32::from(run.len == 1);
-            begins[usize::from(run.first & 3)] += 1;
-            ends[usize::from((run.first + run.len - 1) & 3)] += 1;
+        scan::rows(&polygon, |span| {
+            pixels += u64::from(span.len);
+            writes[2] += u64::from(span.len.min(4));
+            one += u32::from(span.len == 1);
+            begins[usize::from(span.first & 3)] += 1;
+            ends[usize::from((span.first + span.len - 1) & 3)] += 1;
         })
         .unwrap();
         (writes[0], writes[1]) = (pixels, pixels);
-        let walks = jobs(Mapper::Rows(Rows::Steps), &face, &texture);
+        let steppers = jobs(Mapper::Rows(Rows::Steps), &face, &texture);
         for (rows, writes) in ROWS.into_iter().zip(writes) {
             let mapper = Mapper::Rows(rows);
-            assert_eq!(jobs(mapper, &face, &texture), walks);
+            assert_eq!(jobs(mapper, &face, &texture), steppers);
             assert_eq!(check_pixels(mapper, &face, &texture) as u64, pixels);
             let [(stats, polygons), (_, planes)] = check_drawing(mapper, &face, &texture);
             let asked = (polygons.map_mask, polygons.ports, polygons.stores);
@@ -60,10 +60,10 @@ type Stepped = ((i64, i64), [i32; 2], u16);
 fn half_steps(polygon: &[Vertex], texture: &Texture<'_>, axis: Axis) -> Vec<Stepped> {
     let sides = Sides::new(polygon, texture, axis).unwrap();
     let mut pixels = Vec::new();
-    coverage::runs(axis, polygon, |run| {
-        let walk = sides.half_step(&run);
-        for (i, (u, v)) in (0..run.len).zip(walk) {
-            let (line, at) = (i64::from(run.line), i64::from(run.first + i));
+    scan::spans_and_crossings(axis, polygon, |span| {
+        let stepper = sides.half_step(&span);
+        for (i, (u, v)) in (0..span.len).zip(stepper) {
+            let (line, at) = (i64::from(span.line), i64::from(span.first + i));
             let place = match axis {
                 Axis::Down => (line, at),
                 Axis::Right => (at, line),

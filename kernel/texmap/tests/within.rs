@@ -7,13 +7,15 @@ use std::ops::ControlFlow;
 
 use oracle::coverage::inside;
 use random::{COLUMNS, DEEP_COLUMNS, off, side};
-use texmap::adaptive::{EXACT, LENGTHS, PIECE, Pieces};
-use texmap::bounds::{Affine, Bend};
-use texmap::coverage::{self, Axis};
-use texmap::plane::{self, Anchor};
-use texmap::runs::Pieces::Whole;
-use texmap::within::{ROW, Within};
-use texmap::{Face, Mapper, Point, Texture, Tolerance, Vertex, Walk};
+use texmap::mappers::adaptive::{AdaptivePieces, EXACT, LENGTHS, PIECE};
+use texmap::mappers::affine::Sides;
+use texmap::mappers::within::{ROW, Within};
+use texmap::plane::bounds::SpanBound;
+use texmap::plane::{Anchor, Plane};
+use texmap::scan::{self, Span};
+use texmap::{
+    Axis, Face, Mapper, PlaneStepper, Point, SpanKind, Subdivision, Texture, Tolerance, Vertex,
+};
 
 const FOCAL_LENGTH: i32 = 258;
 
@@ -111,7 +113,7 @@ fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
 /// Passes random faces from [`seen`] to `sink` until it breaks.
 fn faces(
     random: &mut fastrand::Rng,
-    mut sink: impl FnMut(&Face<'_>, &plane::Plane, &Texture<'_>) -> ControlFlow<()>,
+    mut sink: impl FnMut(&Face<'_>, &Plane, &Texture<'_>) -> ControlFlow<()>,
 ) {
     let texels = vec![0; 1 << 16];
     loop {
@@ -137,12 +139,12 @@ fn faces(
 fn columns(
     least: u32,
     random: &mut fastrand::Rng,
-    mut sink: impl FnMut(&Face<'_>, &plane::Plane, &Texture<'_>, &coverage::Run),
+    mut sink: impl FnMut(&Face<'_>, &Plane, &Texture<'_>, &Span),
 ) {
     let mut count = 0;
     faces(random, |face, plane, texture| {
-        coverage::columns(face.polygon, |run| {
-            sink(face, plane, texture, &run);
+        scan::columns(face.polygon, |span| {
+            sink(face, plane, texture, &span);
             count += 1;
         })
         .unwrap();
@@ -158,46 +160,43 @@ fn enough(enough: bool) -> ControlFlow<()> {
 }
 
 /// The forms along a span.
-fn forms(plane: &plane::Plane, axis: Axis, run: &coverage::Run<()>) -> plane::Walk {
-    match axis {
-        Axis::Down => plane::Walk::new(plane, axis, run.line, run.first),
-        Axis::Right => plane::Walk::new(plane, axis, run.first, run.line),
-    }
+fn forms(plane: &Plane, axis: Axis, span: &Span<()>) -> PlaneStepper {
+    PlaneStepper::along(plane, axis, span.line, span.first)
 }
 
 /// The walk of another walk's pixels from `first` on.
-fn from(walk: &plane::Walk, first: u16) -> plane::Walk {
-    plane::Walk {
-        at: walk.after(first),
-        ..*walk
+fn from(stepper: &PlaneStepper, first: u16) -> PlaneStepper {
+    PlaneStepper {
+        at: stepper.after(first),
+        ..*stepper
     }
 }
 
 /// Whether all of a span may be one line, by the closed form.
-fn keeps(walk: &plane::Walk, len: u16, tolerance: Tolerance, texture: &Texture<'_>) -> bool {
-    let first = Pieces::new(walk, len, None, tolerance, texture).next();
+fn keeps(stepper: &PlaneStepper, len: u16, tolerance: Tolerance, texture: &Texture<'_>) -> bool {
+    let first = AdaptivePieces::new(stepper, len, None, tolerance, texture).next();
     first.is_some_and(|piece| piece.len == len)
 }
 
 /// Checks that no cheaper method would have kept to the error by its own bound, by trying all of them. Counts
 /// the pixels of each method; an adaptive span's pieces count by their lengths.
 fn none_cheaper(
-    walk: &plane::Walk,
+    stepper: &PlaneStepper,
     (len, row): (u16, Option<u16>),
     tolerance: Tolerance,
     texture: &Texture<'_>,
     mut count: impl FnMut(&'static str, u16),
 ) {
-    let keeps = |first: u16, len: u16| keeps(&from(walk, first), len, tolerance, texture);
+    let keeps = |first: u16, len: u16| keeps(&from(stepper, first), len, tolerance, texture);
     assert!(!keeps(0, len), "a line would do");
-    let backward = walk.step[2] > 0;
+    let backward = stepper.step[2] > 0;
     // The line of `steps` steps from pixel `near` of the span, away from its near end.
     let line = |near: u16, steps: u16| match backward {
         false => keeps(near, steps + 1),
         true => keeps(near - steps, steps + 1),
     };
     let place = |done: u16| if backward { len - 1 - done } else { done };
-    let mut pieces = Pieces::new(walk, len, row, tolerance, texture);
+    let mut pieces = AdaptivePieces::new(stepper, len, row, tolerance, texture);
     let mut done = 0;
     for piece in pieces.by_ref() {
         let left = len - 1 - done;
@@ -231,8 +230,8 @@ fn none_cheaper(
         // Pixels for which a quadratic of 32 pixels would have needed three quarters of the time.
         let curves = (done..len - 1).step_by(32).filter(|&at| at + 32 < len);
         let first = |at: u16| if backward { len - 1 - at - 32 } else { at };
-        let bends = curves.map(|at| Bend::new(&from(walk, first(at)), 33, texture));
-        let curved = bends.filter(|bend| bend.quadratic(Whole) <= tolerance.units());
+        let bends = curves.map(|at| SpanBound::new(&from(stepper, first(at)), 33, texture));
+        let curved = bends.filter(|bend| bend.quadratic(Subdivision::Whole) <= tolerance.units());
         let curved = 32 * curved.count() as u16;
         count("exact, a curve would do", curved);
         count("exact", rest - curved);
@@ -246,34 +245,34 @@ fn within(least: u32, tolerance: &str) {
     let mut random = seeded::generator();
     let tolerance = Tolerance::parse(tolerance).unwrap();
     let mut ways = [BTreeMap::new(), BTreeMap::new()];
-    let (mut worst, mut pixels, mut runs) = (0f64, [0u64; 2], [0; 2]);
+    let (mut worst, mut pixels, mut spans) = (0f64, [0u64; 2], [0; 2]);
     faces(&mut random, |face, plane, texture| {
         let within = Within::new(face.polygon, *plane, texture, tolerance);
         for axis in [Axis::Down, Axis::Right] {
             let k = usize::from(axis == Axis::Right);
-            let mut walks = within.walks(texture);
-            coverage::spans(axis, face.polygon, |run| {
-                let forms = forms(plane, axis, &run);
-                let walk = match axis == within.axis() {
-                    true => walks(&run),
+            let mut kind_of = within.kinds(texture);
+            scan::spans(axis, face.polygon, |span| {
+                let forms = forms(plane, axis, &span);
+                let kind = match axis == within.axis() {
+                    true => kind_of(&span),
                     // As if rows were cheaper, or columns.
-                    false => Walk::Adaptive(forms, tolerance),
+                    false => SpanKind::Adaptive(forms, tolerance),
                 };
                 let (x, y, row) = match axis {
-                    Axis::Down => (run.line, run.first, None),
-                    Axis::Right => (run.first, run.line, Some(run.first)),
+                    Axis::Down => (span.line, span.first, None),
+                    Axis::Right => (span.first, span.line, Some(span.first)),
                 };
                 let mut count = |way, pixels: u16| {
                     *ways[k].entry(way).or_insert(0u64) += u64::from(pixels);
                 };
-                match walk {
-                    Walk::Affine(_) if within.map().is_some() => count("one map", run.len),
-                    Walk::Affine(_) => count("a line", run.len),
-                    Walk::Adaptive(..) if keeps(&forms, run.len, tolerance, texture) => {
-                        count("a line", run.len);
+                match kind {
+                    SpanKind::Affine(_) if within.map().is_some() => count("one map", span.len),
+                    SpanKind::Affine(_) => count("a line", span.len),
+                    SpanKind::Adaptive(..) if keeps(&forms, span.len, tolerance, texture) => {
+                        count("a line", span.len);
                     }
-                    Walk::Adaptive(..) => {
-                        none_cheaper(&forms, (run.len, row), tolerance, texture, count);
+                    SpanKind::Adaptive(..) => {
+                        none_cheaper(&forms, (span.len, row), tolerance, texture, count);
                     }
                     other => panic!("no way of the table: {other:?}"),
                 }
@@ -281,14 +280,14 @@ fn within(least: u32, tolerance: &str) {
                     axis,
                     x,
                     y,
-                    len: run.len,
+                    len: span.len,
                     texture: 0,
-                    walk,
+                    kind,
                 };
                 let size = (texture.width(), texture.height());
                 job.pixels(texture, |(to_x, to_y), coordinates| {
                     let off = off(&forms, (to_x - x) + (to_y - y), coordinates, size);
-                    let context = || format!("{walk:?} {run:?} of {:?}", face.polygon);
+                    let context = || format!("{kind:?} {span:?} of {:?}", face.polygon);
                     assert!(
                         off <= f64::from(tolerance.units()),
                         "{off} at {to_x}, {to_y}: {}",
@@ -296,12 +295,12 @@ fn within(least: u32, tolerance: &str) {
                     );
                     worst = worst.max(off);
                 });
-                pixels[k] += u64::from(run.len);
-                runs[k] += 1;
+                pixels[k] += u64::from(span.len);
+                spans[k] += 1;
             })
             .unwrap();
         }
-        enough(runs.iter().all(|&runs| runs >= least))
+        enough(spans.iter().all(|&spans| spans >= least))
     });
     if !seeded::is_whole() {
         return;
@@ -317,8 +316,8 @@ fn within(least: u32, tolerance: &str) {
         let shares: Vec<_> = ways[k].iter().map(share).collect();
         println!(
             "  {} {name} of {} pixels; of these, in %: {}",
-            runs[k],
-            pixels[k] / u64::from(runs[k]),
+            spans[k],
+            pixels[k] / u64::from(spans[k]),
             shares.join(", ")
         );
         for way in ["a line", "exact", "lines", "long lines"] {
@@ -339,7 +338,7 @@ fn within(least: u32, tolerance: &str) {
 
 /// The lengths of pieces are those that pay.
 #[test]
-fn a_shorter_piece_would_take_longer_than_quotients() {
+fn a_shorter_piece_would_cost_more_than_quotients() {
     let shortest = u32::from(LENGTHS[LENGTHS.len() - 1]);
     assert!(PIECE + shortest < EXACT * shortest);
     let less = shortest - 4;
@@ -359,11 +358,11 @@ fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>
         },
     );
     let mut cost = 0;
-    coverage::spans(axis, face.polygon, |run| {
-        let row = (axis == Axis::Right).then_some(run.first);
-        let forms = forms(&plane, axis, &run);
-        let mut pieces = Pieces::new(&forms, run.len, row, tolerance, texture);
-        cost += pieces.by_ref().count() as u64 * u64::from(piece) + u64::from(run.len);
+    scan::spans(axis, face.polygon, |span| {
+        let row = (axis == Axis::Right).then_some(span.first);
+        let forms = forms(&plane, axis, &span);
+        let mut pieces = AdaptivePieces::new(&forms, span.len, row, tolerance, texture);
+        cost += pieces.by_ref().count() as u64 * u64::from(piece) + u64::from(span.len);
         let exact = pieces.rest().map_or(0, |(_, len, _)| u64::from(len));
         cost += exact * u64::from(EXACT - 1);
     })
@@ -374,7 +373,7 @@ fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>
 /// The axis is chosen from a polygon's corners. Measures how close that choice comes to the cost of all
 /// spans.
 #[test]
-fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
+fn the_chosen_axis_is_nearly_always_the_cheaper_axis() {
     let mut random = seeded::generator();
     for tolerance in ["1", "1/4", "1/16"] {
         let tolerance = Tolerance::parse(tolerance).unwrap();
@@ -408,7 +407,7 @@ fn the_axis_that_is_taken_is_nearly_always_the_cheaper_one() {
 }
 
 #[test]
-fn every_run_keeps_to_its_error_and_none_wastes_anything() {
+fn every_span_keeps_to_its_error_at_the_least_cost() {
     for tolerance in ["1", "1/2", "1/4", "1/16", "1/256"] {
         within(COLUMNS, tolerance);
     }
@@ -417,7 +416,7 @@ fn every_run_keeps_to_its_error_and_none_wastes_anything() {
 /// `cargo test --release -p texmap --test within -- --ignored --nocapture`
 #[test]
 #[ignore = "a million columns and rows for each error: some minutes in a release build"]
-fn every_run_of_a_million_keeps_to_its_error() {
+fn every_span_of_a_million_keeps_to_its_error() {
     for tolerance in ["1", "1/2", "1/4", "1/16", "1/256"] {
         within(DEEP_COLUMNS, tolerance);
     }
@@ -435,33 +434,109 @@ fn a_million_affine_columns_keep_to_their_closed_form() {
     affine(DEEP_COLUMNS);
 }
 
+/// The error bound of the affine mapper in a polygon, in units of 2^-16 texel: see [`Sides::stepper`].
+///
+/// A corner's own coordinates differ slightly from the quotients at the place where the corner is snapped to.
+/// Between two corners a coordinate is a chord along the side, and down the column it is another chord between
+/// points of two sides: these errors add up.
+struct AffineBound {
+    plane: Plane,
+    /// The largest error of a coordinate on any side, including the corners.
+    sides: f64,
+    /// The size of the texture, which no error exceeds: both coordinates are inside.
+    most: f64,
+}
+
+impl AffineBound {
+    /// Allowance for fixed point: 2^-7 texel, most of it for a texture that is squeezed into a sliver.
+    const ROUNDING: f64 = 512.0;
+
+    fn new(polygon: &[Vertex], plane: &Plane, texture: &Texture<'_>) -> Self {
+        let (u, v) = texture.last();
+        let mut bound = Self {
+            plane: *plane,
+            sides: 0.0,
+            most: f64::from(u.max(v) + 1),
+        };
+        let mut corners = 0f64;
+        for (i, a) in polygon.iter().enumerate() {
+            let b = &polygon[(i + 1) % polygon.len()];
+            let (from, to) = (bound.at(a.x, a.y), bound.at(b.x, b.y));
+            bound.sides = bound.sides.max(bound.chord(from, to));
+            corners = corners.max(bound.corner(a, from));
+        }
+        bound.sides += corners;
+        bound
+    }
+
+    /// Returns the bound in a column of the polygon.
+    fn column(&self, span: &Span) -> f64 {
+        // The crossings have 32 fraction bits and are off by less than 2^-23. These places are at least 1/256
+        // pixel further out.
+        let [top, bottom] = span.ends.map(|crossing| (crossing.at >> 24) as i32);
+        let x = i32::from(span.line) * 256 + 128;
+        let column = self.chord(self.at(x, top - 1), self.at(x, bottom + 2));
+        (column + self.sides + Self::ROUNDING).min(self.most)
+    }
+
+    /// Returns the quotients and c at a place given in 1/256 pixel, or nothing on the horizon and beyond it.
+    fn at(&self, x: i32, y: i32) -> Option<[f64; 3]> {
+        let [a, b, c] = [self.plane.a, self.plane.b, self.plane.c].map(|form| {
+            let right = i128::from(form.right) * i128::from(x - 128);
+            let down = i128::from(form.down) * i128::from(y - 128);
+            (i128::from(form.origin) * 256 + right + down) as f64
+        });
+        (c > 0.0).then_some([a / c * 65536.0, b / c * 65536.0, c])
+    }
+
+    /// Returns how far the coordinates of a corner are from the quotients there.
+    fn corner(&self, vertex: &Vertex, at: Option<[f64; 3]>) -> f64 {
+        at.map_or(self.most, |[u, v, _]| {
+            let off = (u - f64::from(vertex.u))
+                .abs()
+                .max((v - f64::from(vertex.v)).abs());
+            off.min(self.most) + 1.0
+        })
+    }
+
+    /// Returns the closed form for a chord between two places.
+    fn chord(&self, from: Option<[f64; 3]>, to: Option<[f64; 3]>) -> f64 {
+        let (Some(from), Some(to)) = (from, to) else {
+            return self.most;
+        };
+        let root = (from[2].max(to[2]) / from[2].min(to[2])).sqrt();
+        let change = (to[0] - from[0]).abs().max((to[1] - from[1]).abs());
+        (change * (root - 1.0) / (root + 1.0)).min(self.most)
+    }
+}
+
 fn affine(least: u32) {
     let least = seeded::cases(least as usize) as u32;
     let mut random = seeded::generator();
     let (mut tightest, mut sum, mut count) = (0f64, 0f64, 0u32);
-    let mut held: Option<(Vec<Vertex>, Affine, texmap::affine::Sides)> = None;
-    columns(least, &mut random, |face, plane, texture, run| {
+    let mut held: Option<(Vec<Vertex>, AffineBound, Sides)> = None;
+    columns(least, &mut random, |face, plane, texture, span| {
         if held
             .as_ref()
             .is_none_or(|(polygon, ..)| polygon != face.polygon)
         {
-            let bounds = Affine::new(face.polygon, plane, texture);
-            let sides = texmap::affine::Sides::new(face.polygon, texture, Axis::Down).unwrap();
+            let bounds = AffineBound::new(face.polygon, plane, texture);
+            let sides = Sides::new(face.polygon, texture, Axis::Down).unwrap();
             held = Some((face.polygon.to_vec(), bounds, sides));
         }
         let Some((_, bounds, sides)) = &held else {
             return;
         };
-        let bound = f64::from(bounds.column(run));
-        let forms = plane::Walk::new(plane, Axis::Down, run.line, run.first);
+        let bound = bounds.column(span);
+        let forms = PlaneStepper::along(plane, Axis::Down, span.line, span.first);
         let size = (texture.width(), texture.height());
         let mut error = 0f64;
-        for (i, at) in (0..run.len).zip(sides.walk(run)) {
+        for (i, at) in (0..span.len).zip(sides.stepper(span)) {
             error = error.max(off(&forms, i, at, size));
         }
         assert!(
             error <= bound + 1e-6,
-            "{error} above {bound}: {run:?} of {:?}",
+            "{error} above {bound}: {span:?} of {:?}",
             face.polygon
         );
         let most = f64::from(size.0.max(size.1)) * 65536.0;
@@ -518,11 +593,11 @@ fn names_say_the_error() {
 
 /// The faces of these tests cover the pixels that their polygons do.
 #[test]
-fn a_run_is_inside_its_polygon() {
+fn a_span_is_inside_its_polygon() {
     let mut random = seeded::generator();
-    columns(2_000, &mut random, |face, _, _, run| {
+    columns(2_000, &mut random, |face, _, _, span| {
         let points: Vec<Point> = face.polygon.iter().map(|&vertex| vertex.into()).collect();
-        assert!(inside(&points, run.line.into(), run.first.into()));
+        assert!(inside(&points, span.line.into(), span.first.into()));
     });
 }
 
@@ -556,7 +631,7 @@ fn a_sliver_with_more_texels_a_pixel_than_a_texture_has_keeps_to_its_error() {
     let mut pixels = 0;
     for mapper in ["within-1", "within-1/256"] {
         let jobs = Mapper::parse(mapper).unwrap().jobs(&face, &texture, |job| {
-            let forms = plane::Walk::new(&face.plane(), job.axis, job.x, job.y);
+            let forms = PlaneStepper::new(&face.plane(), job.axis, job.x, job.y);
             job.pixels(&texture, |(x, y), at| {
                 let off = off(&forms, (x - job.x) + (y - job.y), at, (256, 256));
                 assert!(off <= 65536.0, "{off} at {y} of {job:?}");

@@ -3,8 +3,8 @@
 use std::fmt;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-use texmap::coverage::{Axis, Dropped, Run, columns, rows, runs as runs_of, spans};
-use texmap::{MAX_SIDES, Point};
+use texmap::scan::{Span, columns, rows, spans, spans_and_crossings};
+use texmap::{Axis, Dropped, MAX_SIDES, Point};
 
 use crate::coverage::{Area, Pixels, Row};
 
@@ -21,9 +21,9 @@ pub struct CoverageCase {
 /// One of the renderer's scans.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Scan {
-    /// [`texmap::coverage::columns`].
+    /// [`texmap::scan::columns`].
     Columns,
-    /// [`texmap::coverage::rows`].
+    /// [`texmap::scan::rows`].
     Rows,
 }
 
@@ -36,7 +36,7 @@ pub enum CoverageError {
     Panicked,
     /// A span is empty, out of order, overlaps the previous span, or has a pixel outside the screen or beyond
     /// the ring of pixels around the polygon.
-    Misplaced(Scan, Run),
+    Misplaced(Scan, Span),
     /// Scan and oracle disagree about whether the pixel is inside.
     Pixel {
         /// The scan that differs.
@@ -65,10 +65,10 @@ impl fmt::Display for CoverageError {
         match self {
             Self::Dropped(scan, why) => write!(f, "{} dropped the polygon: {why:?}", name(scan)),
             Self::Panicked => write!(f, "a scan panicked"),
-            Self::Misplaced(scan, run) => {
-                let Run {
+            Self::Misplaced(scan, span) => {
+                let Span {
                     line, first, len, ..
-                } = run;
+                } = span;
                 write!(
                     f,
                     "{} gave a misplaced span: line {line}, {len} pixels from {first}",
@@ -104,7 +104,7 @@ pub struct CoverageChecker {
     scanned: Pixels,
     union: Pixels,
     /// Line, first pixel and length of each span.
-    runs: Vec<(u16, u16, u16)>,
+    found: Vec<(u16, u16, u16)>,
 }
 
 impl CoverageChecker {
@@ -166,18 +166,18 @@ impl CoverageChecker {
 
     /// Compares the spans without crossings to the spans with crossings.
     fn spans(&mut self, polygon: &[Point], axis: Axis) -> Result<(), CoverageError> {
-        let mut runs = std::mem::take(&mut self.runs);
-        runs.clear();
-        let with = runs_of(axis, polygon, |run| {
-            runs.push((run.line, run.first, run.len))
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        let with = spans_and_crossings(axis, polygon, |span| {
+            found.push((span.line, span.first, span.len))
         });
-        let mut rest = runs.iter();
+        let mut rest = found.iter();
         let mut same = true;
-        let without = spans(axis, polygon, |run| {
-            same &= rest.next() == Some(&(run.line, run.first, run.len));
+        let without = spans(axis, polygon, |span| {
+            same &= rest.next() == Some(&(span.line, span.first, span.len));
         });
         same &= rest.next().is_none() && with == without;
-        self.runs = runs;
+        self.found = found;
         if same {
             Ok(())
         } else {
@@ -196,12 +196,12 @@ impl CoverageChecker {
         // The earliest place where the next span may begin.
         let mut free = (lines.start, cells.start);
         let mut wrong = None;
-        let sink = |run: Run| {
-            let (line, first) = (i32::from(run.line), i32::from(run.first));
-            let end = first + i32::from(run.len);
+        let sink = |span: Span| {
+            let (line, first) = (i32::from(span.line), i32::from(span.first));
+            let end = first + i32::from(span.len);
             let placed = lines.contains(&line) && cells.start <= first && end <= cells.end;
             if !placed || first == end || (line, first) < free {
-                wrong.get_or_insert(CoverageError::Misplaced(scan, run));
+                wrong.get_or_insert(CoverageError::Misplaced(scan, span));
                 return;
             }
             free = (line, end);

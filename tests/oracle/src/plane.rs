@@ -7,9 +7,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use fastrand::Rng;
 use modex::{Destination, PlanarBuffer};
-use texmap::coverage::Axis;
-use texmap::plane::{Anchor, Form, MAX_POSITION, Plane, ROUNDING, Walk};
-use texmap::{Texture, exact};
+use texmap::mappers::exact;
+use texmap::plane::{Anchor, Form, MAX_POSITION, Plane, PlaneStepper, ROUNDING};
+use texmap::{Axis, Texture};
 
 use crate::mix::stream;
 use crate::texel::{forms, perspective};
@@ -306,9 +306,9 @@ impl PlaneChecker {
         for (down, (form, size)) in [(false, (plane.a, w)), (true, (plane.b, h))] {
             let texels = &axes[usize::from(down)][..usize::from(w) * usize::from(h)];
             let texture = Texture::new(texels, w, h).expect("a legal size");
-            let walk = Walk::new(plane, Axis::Down, x, y);
+            let stepper = PlaneStepper::new(plane, Axis::Down, x, y);
             self.page.column(x, y, len, |column| {
-                exact::column(&texture, walk, len, column)
+                exact::column(&texture, stepper, len, column)
             });
             for (y, (clamped, tied)) in (y..y + len).zip(&mut marks) {
                 let (n, c) = (at(&form, x, y), at(&plane.c, x, y));

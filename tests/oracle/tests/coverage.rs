@@ -7,8 +7,8 @@ use oracle::check::{CoverageCase, CoverageChecker};
 use oracle::mix::PolygonMix;
 use oracle::shrink::{shrink, source};
 use oracle::small_world::{STEPS, TRIANGLES, triangle};
-use texmap::coverage::{self, Dropped};
-use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
+use texmap::scan;
+use texmap::{Dropped, MAX_COORDINATE, MAX_SIDES, Point};
 
 /// Cases of each mix: ten seconds of them.
 const CASES: usize = 100_000;
@@ -105,7 +105,7 @@ fn a_polygon_beyond_the_limits_is_dropped_and_gives_no_span() {
         (shifted(0, 1), Dropped::OutOfRange),
         (with_sides(MAX_SIDES + 1), Dropped::TooManySides),
     ] {
-        assert_eq!(coverage::columns(&polygon, panics), Err(why));
-        assert_eq!(coverage::rows(&polygon, panics), Err(why));
+        assert_eq!(scan::columns(&polygon, panics), Err(why));
+        assert_eq!(scan::rows(&polygon, panics), Err(why));
     }
 }

@@ -32,9 +32,9 @@ const NOT_MEASURED: &str = "not measured, because this run left the mappers out"
 /// Angles between the screen's axes and the line of constant depth, in tenths of a degree.
 const TILTS: [u32; 7] = [0, 5, 10, 20, 50, 150, 450];
 
-/// Returns the accuracy of the mapper `free` at each of `TILTS`, if the mapper exists.
+/// Returns the accuracy of the mapper `free-direction` at each of `TILTS`, if the mapper exists.
 pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
-    let free = Mapper::parse("free")?;
+    let mapper = Mapper::parse("free-direction")?;
     let entry = Entry::parse("grazing-16")?;
     let mut jobs = Box::new(FrameJobs::new());
     let tilts = TILTS.map(|tenths| {
@@ -43,7 +43,7 @@ pub fn tilts() -> Option<Vec<(f64, Accuracy)>> {
             ..entry.pose(0)
         };
         let accuracy = with_poses(entry, &[pose], |workload| {
-            accuracy::measure(workload, free, &mut jobs)
+            accuracy::measure(workload, mapper, &mut jobs)
         });
         (f64::from(tenths) / 10.0, accuracy)
     });
@@ -82,10 +82,10 @@ pub fn all(
         ),
         _ => String::new(),
     };
-    let two_steps = match (
-        spans.time("two-steps", Polygons),
+    let step_table = match (
+        spans.time("step-table", Polygons),
         spans.time("packed", Polygons),
-        spans.time("two-steps", Planes),
+        spans.time("step-table", Planes),
         spans.time("packed", Planes),
     ) {
         (Some(a), Some(b), Some(c), Some(d)) => {
@@ -136,10 +136,10 @@ pub fn all(
         Claim {
             source: "chapter 58, on John Miles's loop",
             claimed: "a table of two steps costs half a cycle to one more than the branch",
-            measured: two_steps,
+            measured: step_table,
             why: "Carries follow a regular pattern, which today's branch predictors learn: then the \
                   branch is free. Where they do not learn the pattern, a misprediction costs about 15 \
-                  cycles, and the table none.",
+                  cycles, and the table costs no more.",
         },
         Claim {
             source: "chapter 58, listing 58.3",
@@ -266,7 +266,7 @@ mod tests {
                 ("row-steps", 6.0),
                 ("two-carries", 4.0),
                 ("packed", 3.0),
-                ("two-steps", 2.0),
+                ("step-table", 2.0),
                 ("extract", 1.0),
             ] {
                 points.push(sweep(mapper, order, time * scale));

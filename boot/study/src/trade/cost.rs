@@ -7,10 +7,8 @@
 //! make a drawing slower.
 
 use modex::{Destination, PlanarBuffer};
-use texmap::coverage::Axis;
-use texmap::loops::Loop;
 use texmap::plane::Anchor;
-use texmap::{Job, Mapper, Order, Renderer, Texture, Vertex, Walk};
+use texmap::{Axis, Job, Loop, Mapper, Order, Renderer, SpanKind, Texture, Vertex};
 
 use super::accuracy::FrameJobs;
 use super::clock;
@@ -196,12 +194,12 @@ fn draw_by_portable(
     page: &mut PlanarBuffer,
 ) {
     let mut one = |job: &Job| {
-        let Walk::Affine(walk) = job.walk else {
+        let SpanKind::Affine(stepper) = job.kind else {
             unreachable!("the loops are affine");
         };
         let texture = &textures[usize::from(job.texture)];
         page.column(job.x, job.y, job.len, |column| {
-            portable.portable(texture, walk, column);
+            portable.portable(texture, stepper, column);
         });
     };
     match order {
@@ -588,15 +586,15 @@ pub fn unrolling(workload: &Workload<'_>, effort: Effort) -> Spread {
         .texels()
         .try_into()
         .expect("the workload's texture is the largest");
-    let walk = |job: &Job| {
-        let Walk::Affine(walk) = job.walk else {
+    let stepped = |job: &Job| {
+        let SpanKind::Affine(stepper) = job.kind else {
             unreachable!("the mapper is affine");
         };
-        let (mut u, mut v) = (walk.u as u32, walk.v as u32);
+        let (mut u, mut v) = (stepper.u as u32, stepper.v as u32);
         move || {
             let texel = texels[usize::from(((v >> 8) & 0xFF00 | (u >> 16) & 0xFF) as u16)];
-            u = u.wrapping_add(walk.du as u32);
-            v = v.wrapping_add(walk.dv as u32);
+            u = u.wrapping_add(stepper.du as u32);
+            v = v.wrapping_add(stepper.dv as u32);
             texel
         }
     };
@@ -605,7 +603,7 @@ pub fn unrolling(workload: &Workload<'_>, effort: Effort) -> Spread {
         let columns = move |arena: &mut DrawMemory| {
             for plane in 0..4 {
                 for job in jobs.iter().filter(|job| job.x & 3 == plane) {
-                    let mut next = walk(job);
+                    let mut next = stepped(job);
                     arena
                         .page
                         .lane(job.x, job.y, job.len, |mut column: modex::Column<'_>| {

@@ -7,8 +7,7 @@
 mod work;
 
 use modex::PlanarBuffer;
-use texmap::loops::Loop;
-use texmap::{Mapper, Rows};
+use texmap::{Loop, Mapper, Rows};
 use work::{By, Order, PIECES, PIXELS, draw, texels, texture};
 
 /// All that is timed.
@@ -109,7 +108,7 @@ mod cycles {
                 },
             );
         }
-        // What `texmap::adaptive` counts with.
+        // What `texmap::mappers::adaptive` counts with.
         for order in [Order::X, Order::Planes] {
             let [short, long] = [PIECES[0], PIECES[PIECES.len() - 1]];
             let more = median(By::Pieces(short), order) - median(By::Pieces(long), order);

@@ -2,10 +2,9 @@
 //! the loop that can't be beaten.
 
 use modex::{Column, Destination, PlanarBuffer};
-use texmap::affine::Walk as Affine;
-use texmap::coverage::Axis;
-use texmap::loops::Loop;
-use texmap::{Job, Rows, Style, Texture, Tolerance, Walk, plane};
+use texmap::{
+    AffineStepper, Axis, Job, Loop, PlaneStepper, Rows, SpanKind, Style, Texture, Tolerance,
+};
 
 /// Columns of the frame.
 pub const COLUMNS: u16 = 320;
@@ -34,9 +33,9 @@ pub fn texture(texels: &[u8]) -> Texture<'_> {
 const STEPS: (i32, i32) = (13_235, 17_695);
 
 /// The walk down column `x`.
-pub fn down(x: u16) -> Affine {
+pub fn down(x: u16) -> AffineStepper {
     let (x, (du, dv)) = (i32::from(x), STEPS);
-    Affine {
+    AffineStepper {
         u: 0x1_0000 + x * dv,
         v: 0x1_8000 + (i32::from(COLUMNS) - x) * du,
         du,
@@ -45,9 +44,9 @@ pub fn down(x: u16) -> Affine {
 }
 
 /// The walk along row `y` of the same frame.
-pub fn along(y: u16) -> Affine {
+pub fn along(y: u16) -> AffineStepper {
     let (first, y, (du, dv)) = (down(0), i32::from(y), STEPS);
-    Affine {
+    AffineStepper {
         u: first.u + y * du,
         v: first.v + y * dv,
         du: dv,
@@ -106,10 +105,10 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
         By::Pieces(length) => {
             let tolerance = tolerance(length);
             columns(page, texture, order, |x| {
-                Walk::Adaptive(leaning(x, 1, 13), tolerance)
+                SpanKind::Adaptive(leaning(x, 1, 13), tolerance)
             });
         }
-        By::Quotients => columns(page, texture, order, |x| Walk::Exact(leaning(x, 8, 8))),
+        By::Quotients => columns(page, texture, order, |x| SpanKind::Exact(leaning(x, 8, 8))),
         By::Rows(rows) => {
             let style = Style {
                 rows,
@@ -122,7 +121,7 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
                     y,
                     len: COLUMNS,
                     texture: 0,
-                    walk: Walk::Affine(along(y)),
+                    kind: SpanKind::Affine(along(y)),
                 };
                 row.draw(style, texture, page);
             }
@@ -135,10 +134,10 @@ pub const PIECES: [u16; 4] = [8, 16, 32, 64];
 
 /// The forms down column `x`: depth falls by a part in 2^`lean` of its first value with every
 /// pixel, and the texture begins to pass at a part of the frame's steps.
-fn leaning(x: u16, part: i64, lean: u32) -> plane::Walk {
+fn leaning(x: u16, part: i64, lean: u32) -> PlaneStepper {
     let depth = 1 << 44;
     let fall = -(depth >> lean);
-    let Affine { u, v, du, dv } = down(x);
+    let AffineStepper { u, v, du, dv } = down(x);
     let form = |at: i32, step: i32| {
         let (at, step) = (i64::from(at), i64::from(step) / part);
         let whole = |n: i128| (n >> 16) as i64;
@@ -146,7 +145,7 @@ fn leaning(x: u16, part: i64, lean: u32) -> plane::Walk {
         (whole(i128::from(at) * i128::from(depth)), whole(rise))
     };
     let (a, b) = (form(u, du), form(v, dv));
-    plane::Walk {
+    PlaneStepper {
         at: [a.0, b.0, depth],
         step: [a.1, b.1, fall],
     }
@@ -166,7 +165,7 @@ fn columns(
     page: &mut PlanarBuffer,
     texture: &Texture<'_>,
     order: Order,
-    walk: impl Fn(u16) -> Walk,
+    kind: impl Fn(u16) -> SpanKind,
 ) {
     let style = Style {
         affine: Loop::fastest(),
@@ -179,7 +178,7 @@ fn columns(
             y: 0,
             len: LEN,
             texture: 0,
-            walk: walk(x),
+            kind: kind(x),
         };
         job.draw(style, texture, page);
     }

@@ -1,4 +1,4 @@
-//! The loops in x86-64 instructions. [`super`] explains why they may read without a check.
+//! The loops in x86-64 instructions. [`super::select`] explains why they may read without a check.
 //!
 //! All loops share a frame of code: blocks of [`BLOCK`] pixels, where each store has a constant
 //! offset (chapter 58). The frame enters the first block in the middle, so that the pixels left
@@ -7,21 +7,21 @@
 //! address, DEC counts), so a loop may keep a carry in it. The fastest loops have a second frame,
 //! for pieces of columns whose pixels come in eights.
 //!
-//! Every function gets the first values of its registers in a type of [`super::steps`]. That type
-//! was made from a walk that stays in the texture, or has masks that do.
+//! Every function gets the first values of its registers in a type of [`super::registers`]. That
+//! type was made from a stepper that stays in the texture, or has masks that do.
 
 #![allow(unsafe_code)]
 
 use core::arch::asm;
-use core::arch::x86_64::{__cpuid, __cpuid_count, _pext_u64};
-use core::sync::atomic::{AtomicU8, Ordering};
+use core::arch::x86_64::_pext_u64;
 
 use modex::{Column, STRIDE};
 
-use super::steps::{Address, Crossed, Halves, Joint, Pair, start};
-use crate::Texture;
-use crate::affine::Walk;
-use crate::places::Part;
+use super::cpu::has_extract;
+use super::registers::{Address, Crossed, Halves, Joint, Pair, start};
+use super::sink::PixelSink;
+use super::stepper::AffineStepper;
+use crate::geometry::Texture;
 
 /// Pixels in a block.
 const BLOCK: usize = 32;
@@ -118,7 +118,7 @@ macro_rules! eights {
 
 /// An address and two fractions, with a test of each carry.
 #[inline(always)]
-pub(super) fn two_carries(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+pub(super) fn two_carries(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -138,7 +138,7 @@ pub(super) fn two_carries(texture: &Texture<'_>, walk: Walk, column: Column<'_>)
             )
         };
     }
-    let Some((start, mut column)) = start::<Address>(texture, walk, column) else {
+    let Some((start, mut column)) = start::<Address>(texture, stepper, column) else {
         return;
     };
     let texels = texture.texels().as_ptr();
@@ -158,7 +158,7 @@ pub(super) fn two_carries(texture: &Texture<'_>, walk: Walk, column: Column<'_>)
 /// Both fractions in one register. The upper fraction's carry leaves the register and is added to
 /// the address; the lower's goes to a bit that is tested.
 #[inline(always)]
-pub(super) fn packed(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+pub(super) fn packed(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -176,7 +176,7 @@ pub(super) fn packed(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
             )
         };
     }
-    let Some((start, mut column)) = start::<Halves>(texture, walk, column) else {
+    let Some((start, mut column)) = start::<Halves>(texture, stepper, column) else {
         return;
     };
     let texels = texture.texels().as_ptr();
@@ -194,7 +194,7 @@ pub(super) fn packed(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
 
 /// SBB turns v's carry into 0 or -1, which selects the step; u's carry is added along with it.
 #[inline(always)]
-pub(super) fn two_steps(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+pub(super) fn step_table(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -209,7 +209,7 @@ pub(super) fn two_steps(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
             )
         };
     }
-    let Some((start, mut column)) = start::<Address>(texture, walk, column) else {
+    let Some((start, mut column)) = start::<Address>(texture, stepper, column) else {
         return;
     };
     let texels = texture.texels().as_ptr();
@@ -228,7 +228,7 @@ pub(super) fn two_steps(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
 
 /// Two accumulators, a mask for each, one shift.
 macro_rules! shifts {
-    ($frame:ident, $texture:ident, $walk:ident, $column:ident, $($more:tt)*) => {
+    ($frame:ident, $texture:ident, $stepper:ident, $column:ident, $($more:tt)*) => {
         macro_rules! pixel {
             ($offset:literal) => {
                 concat!(
@@ -247,7 +247,7 @@ macro_rules! shifts {
                 )
             };
         }
-        let Some((start, mut column)) = start::<Pair>($texture, $walk, $column) else {
+        let Some((start, mut column)) = start::<Pair>($texture, $stepper, $column) else {
             return;
         };
         $frame!(column, "", pixel,
@@ -264,19 +264,19 @@ macro_rules! shifts {
 }
 
 #[inline(always)]
-pub(super) fn shifts(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    shifts!(down, texture, walk, column,);
+pub(super) fn shifts(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
+    shifts!(down, texture, stepper, column,);
 }
 
-/// Draws the whole eights of a column as [`shifts`] does.
+/// Draws the whole eights of a column as `shifts` does.
 #[inline(always)]
-pub(super) fn shifts_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    shifts!(eights, texture, walk, column, spare = out(reg) _,);
+pub(crate) fn shifts_eights(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
+    shifts!(eights, texture, stepper, column, spare = out(reg) _,);
 }
 
 /// One accumulator and one mask, with the row's bits shifted down to the column's.
 #[inline(always)]
-pub(super) fn joined(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
+pub(super) fn one_accumulator(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
         ($offset:literal) => {
             concat!(
@@ -294,7 +294,7 @@ pub(super) fn joined(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
             )
         };
     }
-    let Some((start, mut column)) = start::<Joint>(texture, walk, column) else {
+    let Some((start, mut column)) = start::<Joint>(texture, stepper, column) else {
         return;
     };
     let texels = texture.texels().as_ptr();
@@ -309,8 +309,8 @@ pub(super) fn joined(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
 /// The two registers exchange their carries. Every shift changes the flags, so the row is scaled by
 /// the scale of an address or by moving a byte, depending on the pitch.
 #[inline(always)]
-pub(super) fn add_carry(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    let Some((start, mut column)) = start::<Crossed>(texture, walk, column) else {
+pub(super) fn add_carry(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
+    let Some((start, mut column)) = start::<Crossed>(texture, stepper, column) else {
         return;
     };
     let texels = texture.texels().as_ptr();
@@ -384,7 +384,7 @@ pub(super) fn add_carry(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
 /// One accumulator, and an instruction that gathers the bits of the index. The CPU must have this
 /// instruction.
 macro_rules! extract {
-    ($frame:ident, $texture:ident, $walk:ident, $column:ident) => {
+    ($frame:ident, $texture:ident, $stepper:ident, $column:ident) => {
         macro_rules! pixel {
             ($offset:literal) => {
                 concat!(
@@ -397,7 +397,7 @@ macro_rules! extract {
                 )
             };
         }
-        let Some((start, mut column)) = start::<Joint>($texture, $walk, $column) else {
+        let Some((start, mut column)) = start::<Joint>($texture, $stepper, $column) else {
             return;
         };
         $frame!(column, "", pixel,
@@ -410,24 +410,24 @@ macro_rules! extract {
 }
 
 #[inline(always)]
-pub(super) fn extract(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    extract!(down, texture, walk, column);
+pub(super) fn extract(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
+    extract!(down, texture, stepper, column);
 }
 
-/// Draws the whole eights of a column as [`extract`] does.
+/// Draws the whole eights of a column as `extract` does.
 #[inline(always)]
-pub(super) fn extract_eights(texture: &Texture<'_>, walk: Walk, column: Column<'_>) {
-    extract!(eights, texture, walk, column);
+pub(crate) fn extract_eights(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
+    extract!(eights, texture, stepper, column);
 }
 
-/// Writes the texels of a row as [`extract`] does. The CPU must have BMI2.
+/// Writes the texels of a row as `extract` does. The CPU must have BMI2.
 #[inline(always)]
-pub(super) fn along(texels: &[u8], joint: Joint, places: impl Part) {
-    /// Compiled for a CPU with BMI2, together with the loop that fills `places`.
+pub(super) fn fill_row(texels: &[u8], joint: Joint, sink: impl PixelSink) {
+    /// Compiled for a CPU with BMI2, together with the loop that fills `sink`.
     #[target_feature(enable = "bmi2")]
-    fn extract(texels: &[u8], joint: Joint, places: impl Part) {
+    fn extract(texels: &[u8], joint: Joint, sink: impl PixelSink) {
         let Joint { mut at, step, mask } = joint;
-        places.fill(|| {
+        sink.fill(|| {
             let index = _pext_u64(at, mask) as usize;
             at = at.wrapping_add(step);
             // SAFETY: the mask addresses exactly the texture's texels, so the index is in bounds.
@@ -436,35 +436,5 @@ pub(super) fn along(texels: &[u8], joint: Joint, places: impl Part) {
     }
     debug_assert!(has_extract());
     // SAFETY: the caller guarantees that the CPU has BMI2.
-    unsafe { extract(texels, joint, places) }
-}
-
-/// Returns whether the CPU has BMI2, and with it PEXT. Keeps the answer: CPUID is slow, above all
-/// under a hypervisor.
-#[inline]
-pub(super) fn has_extract() -> bool {
-    const UNKNOWN: u8 = 0;
-    const NO: u8 = 1;
-    const YES: u8 = 2;
-    static EXTRACT: AtomicU8 = AtomicU8::new(UNKNOWN);
-
-    #[cold]
-    fn ask() -> u8 {
-        const FEATURES: u32 = 7;
-        const BMI2: u32 = 1 << 8;
-        let known = __cpuid(0).eax >= FEATURES;
-        let answer = if known && __cpuid_count(FEATURES, 0).ebx & BMI2 != 0 {
-            YES
-        } else {
-            NO
-        };
-        EXTRACT.store(answer, Ordering::Relaxed);
-        answer
-    }
-
-    let known = match EXTRACT.load(Ordering::Relaxed) {
-        UNKNOWN => ask(),
-        known => known,
-    };
-    known == YES
+    unsafe { extract(texels, joint, sink) }
 }

@@ -1,9 +1,9 @@
 //! Faces to map, and checks that they are drawn as their jobs say.
 
 use modex::{Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Tally};
-use texmap::coverage::{self, Axis};
 use texmap::plane::Anchor;
-use texmap::{Face, Job, JobList, Mapper, Order, Renderer, Stats, Texture, Vertex};
+use texmap::scan;
+use texmap::{Axis, Face, Job, JobList, Mapper, Order, Renderer, Stats, Texture, Vertex};
 use vga::Vga;
 
 pub const FOCAL_LENGTH: i32 = 258;
@@ -61,9 +61,9 @@ pub fn jobs(mapper: Mapper, face: &Face<'_>, texture: &Texture<'_>) -> Vec<Job> 
 /// are inside the texture.
 pub fn check_pixels(mapper: Mapper, face: &Face<'_>, texture: &Texture<'_>) -> usize {
     let mut inside = vec![0u8; 320 * 240];
-    coverage::runs(Axis::Down, face.polygon, |run| {
-        for y in run.first..run.first + run.len {
-            inside[usize::from(y) * 320 + usize::from(run.line)] += 1;
+    scan::spans_and_crossings(Axis::Down, face.polygon, |span| {
+        for y in span.first..span.first + span.len {
+            inside[usize::from(y) * 320 + usize::from(span.line)] += 1;
         }
     })
     .unwrap();

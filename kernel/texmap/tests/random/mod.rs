@@ -3,7 +3,7 @@
 // Each test uses only a part of this module.
 #![allow(dead_code)]
 
-use texmap::plane::Walk;
+use texmap::PlaneStepper;
 
 /// Columns that each default test of an error checks, for each mapper.
 pub const COLUMNS: u32 = 100_000;
@@ -39,7 +39,7 @@ fn end(random: &mut fastrand::Rng, size: u16) -> f64 {
 }
 
 /// A span of a visible face: c is above zero, and the coordinates are inside the texture, but for rounding.
-pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> Walk {
+pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> PlaneStepper {
     let ratio = ratio(random);
     let near = (20.0 + 33.0 * random.f64()).exp2() * ratio.max(1.0);
     let near = near.min(53f64.exp2());
@@ -60,14 +60,14 @@ pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> Walk {
         forms[k] = [0, 1].map(|i| ([from, to][i] * forms[2][i] as f64) as i64);
     }
     // The rounding of the steps may leave the texture by a little.
-    Walk {
+    PlaneStepper {
         at: forms.map(|[from, _]| from),
         step: forms.map(|[from, to]| (to - from) / steps),
     }
 }
 
 /// Any span: outside the texture, across the horizon and behind it, and with c = 0 at a pixel.
-pub fn any(random: &mut fastrand::Rng, len: u16) -> Walk {
+pub fn any(random: &mut fastrand::Rng, len: u16) -> PlaneStepper {
     let value = |random: &mut fastrand::Rng, bits: u32| {
         let limit = 1i64 << random.u32(0..=bits);
         random.i64(-limit..=limit)
@@ -77,15 +77,15 @@ pub fn any(random: &mut fastrand::Rng, len: u16) -> Walk {
         let (from, to) = (value(random, bits), value(random, bits));
         (from, (to - from) / steps)
     });
-    let mut walk = Walk {
+    let mut stepper = PlaneStepper {
         at: [a.0, b.0, c.0],
         step: [a.1, b.1, c.1],
     };
     if random.u8(0..4) == 0 {
         // Zero at a pixel's centre.
-        walk.at[2] = -walk.step[2] * random.i64(0..len.into());
+        stepper.at[2] = -stepper.step[2] * random.i64(0..len.into());
     }
-    walk
+    stepper
 }
 
 /// The quotient n / c in units of 2^-16 texel, clamped to a texture of `size` texels. On the horizon and
@@ -100,8 +100,8 @@ pub fn truth(n: i64, c: i64, size: u16) -> f64 {
 }
 
 /// The error of the coordinates at pixel `i` of a walk: the larger of the two.
-pub fn off(walk: &Walk, i: u16, (u, v): (i32, i32), size: (u16, u16)) -> f64 {
-    let [a, b, c] = walk.after(i);
+pub fn off(stepper: &PlaneStepper, i: u16, (u, v): (i32, i32), size: (u16, u16)) -> f64 {
+    let [a, b, c] = stepper.after(i);
     let off = |n: i64, at: i32, size: u16| (truth(n, c, size) - f64::from(at)).abs();
     off(a, u, size.0).max(off(b, v, size.1))
 }

@@ -1,0 +1,332 @@
+//! Perspective by spans: the drawn texels are those of [`Job::pixels`], they stay inside the texture, and
+//! their error is within the bound of [`texmap::plane::bounds`].
+
+mod random;
+
+use modex::PlanarBuffer;
+use random::{COLUMNS, DEEP_COLUMNS, any, off, seen, side};
+use texmap::mappers::pieces::over;
+use texmap::plane::bounds::SpanBound;
+use texmap::plane::{self, Reciprocal, quotients};
+use texmap::{Axis, Job, Mapper, PlaneStepper, SpanKind, Style, Subdivision, Texture};
+
+/// The mappers that draw in pieces, by name, and some more that are not in [`Mapper::ALL`].
+const MAPPERS: [(&str, Subdivision, bool); 12] = [
+    ("linear-2", Subdivision::Of(2), true),
+    ("linear-4", Subdivision::Of(4), true),
+    ("linear-8", Subdivision::Of(8), true),
+    ("linear-16", Subdivision::Of(16), true),
+    ("linear-32", Subdivision::Of(32), true),
+    ("linear-100", Subdivision::Of(100), true),
+    ("linear-powers", Subdivision::Powers, true),
+    ("linear", Subdivision::Whole, true),
+    ("quadratic-16", Subdivision::Of(16), false),
+    ("quadratic-32", Subdivision::Of(32), false),
+    ("quadratic-17", Subdivision::Of(17), false),
+    ("quadratic", Subdivision::Whole, false),
+];
+
+fn job(stepper: PlaneStepper, len: u16, (_, pieces, linear): (&str, Subdivision, bool)) -> Job {
+    Job {
+        axis: Axis::Down,
+        x: 0,
+        y: 0,
+        len,
+        texture: 0,
+        kind: match linear {
+            true => SpanKind::Linear(stepper, pieces),
+            false => SpanKind::Quadratic(stepper, pieces),
+        },
+    }
+}
+
+fn pixels(job: &Job, texture: &Texture<'_>) -> Vec<(i32, i32)> {
+    let mut pixels = Vec::new();
+    job.pixels(texture, |_, at| pixels.push(at));
+    pixels
+}
+
+#[test]
+fn a_quotient_is_less_than_it_should_be_by_below_a_unit_and_three_128ths() {
+    let mut random = seeded::generator();
+    let mut most = 0f64;
+    for _ in 0..seeded::cases(2_000_000) {
+        let bits = random.u32(1..=55);
+        let c = random.i64(1..=1 << bits);
+        let n = random.i64(0..(256 * i128::from(c)).min(i64::MAX.into()) as i64);
+        let quotient = i128::from(Reciprocal::new(c).times(n));
+        let (n, c) = (i128::from(n) << 16, i128::from(c));
+        assert!(quotient * c <= n, "{n} / {c} is above");
+        assert!((n - quotient * c) * 128 < c * 131, "{n} / {c} is off");
+        most = most.max((n - quotient * c) as f64 / c as f64);
+    }
+    println!("less by {most} units at most");
+    assert!(
+        !seeded::is_whole() || most > 1.0,
+        "the bound is what it says only if a unit is passed"
+    );
+}
+
+#[test]
+fn a_step_is_cut_towards_zero() {
+    let mut random = seeded::generator();
+    for steps in 1..=319u16 {
+        let largest = (1 << 24) - 1;
+        let n = i32::from(steps);
+        let whole = random.i32(0..largest / n) * n;
+        for delta in [
+            0,
+            1,
+            n - 1,
+            n,
+            largest,
+            whole,
+            whole + n - 1,
+            random.i32(0..=largest),
+        ] {
+            assert_eq!(over(delta, steps), delta / n, "{delta} / {n}");
+            assert_eq!(over(-delta, steps), -delta / n, "-{delta} / {n}");
+        }
+    }
+}
+
+#[test]
+fn drawn_texels_are_those_of_the_coordinates() {
+    let mut random = seeded::generator();
+    let texels: Vec<u8> = (0..1 << 16).map(|_| random.u8(..)).collect();
+    let (mut page, mut planes) = (PlanarBuffer::new(), PlanarBuffer::new());
+    let mut compared = 0;
+    for case in 0..seeded::cases(30_000) {
+        let (w, h) = (side(&mut random), side(&mut random));
+        let padded = random.bool();
+        let texture = match padded {
+            true => Texture::padded(&texels[..Texture::padded_len(w, h)], w, h),
+            false => Texture::new(&texels[..usize::from(w) * usize::from(h)], w, h),
+        };
+        let texture = texture.unwrap();
+        let axis = [Axis::Down, Axis::Right][case % 2];
+        let (x, y) = (random.u16(0..320), random.u16(0..240));
+        let len = random.u16(1..=[240 - y, 320 - x][case % 2]);
+        let stepper = match random.u8(0..3) {
+            0 => any(&mut random, len),
+            _ => seen(&mut random, len, (w, h)),
+        };
+        let mapper = MAPPERS[random.usize(..MAPPERS.len())];
+        let job = Job {
+            axis,
+            x,
+            y,
+            ..job(stepper, len, mapper)
+        };
+        job.draw(Style::default(), &texture, &mut page);
+        for plane in 0..4 {
+            job.draw_in_plane(plane, Style::default(), &texture, &mut planes);
+        }
+        let (last_u, last_v) = texture.last();
+        job.pixels(&texture, |(x, y), (u, v)| {
+            let context = || format!("{} ({x}, {y}) {job:?} on {w} x {h}", mapper.0);
+            let inside = (0..=last_u).contains(&u) && (0..=last_v).contains(&v);
+            assert!(inside, "({u}, {v}) {}", context());
+            let [drawn, in_plane] = [&page, &planes].map(|page| page.pixel(x.into(), y.into()));
+            assert_eq!(
+                (drawn, in_plane),
+                (texture.at(u, v), texture.at(u, v)),
+                "{}",
+                context()
+            );
+            compared += 1;
+        });
+    }
+    println!("{compared} pixels");
+    assert!(!seeded::is_whole() || compared > 1_000_000);
+}
+
+/// The first pixel of each piece, and the last pixel of the span, have the exact quotient. The loops in the
+/// sources divide by end - start in one place and by end - start - 1 in another, so one of the two reaches
+/// its end a pixel too soon or too late.
+#[test]
+fn pieces_and_the_span_end_at_exact_quotients() {
+    let mut random = seeded::generator();
+    let texture = Texture::new(&[0; 256 * 256], 256, 256).unwrap();
+    for _ in 0..seeded::cases(5_000) {
+        let len = random.u16(1..=240);
+        let stepper = seen(&mut random, len, (256, 256));
+        for mapper in MAPPERS {
+            let Subdivision::Of(of) = mapper.1 else {
+                continue;
+            };
+            let pixels = pixels(&job(stepper, len, mapper), &texture);
+            for i in (0..len - 1).step_by(of.into()).chain([len - 1]) {
+                let [a, b, c] = stepper.after(i);
+                let quotient = (plane::coordinate(a, c, 256), plane::coordinate(b, c, 256));
+                let is = pixels[usize::from(i)];
+                let off = (is.0 - quotient.0).abs().max((is.1 - quotient.1).abs());
+                // The last pixel is that many rounded steps from the piece's start.
+                let drift = match i == len - 1 && mapper.2 {
+                    true => i32::from(of) + 1,
+                    false => 1,
+                };
+                assert!(
+                    off <= drift,
+                    "{} off by {off} at {i} of {len}, {stepper:?}",
+                    mapper.0
+                );
+            }
+        }
+    }
+}
+
+/// "Zero's paradox": the horizon inside the span, and pixels beyond it.
+#[test]
+fn on_the_horizon_and_beyond_nothing_is_divided_by_zero() {
+    let texture = Texture::new(&[0; 256 * 64], 256, 64).unwrap();
+    let (last_u, last_v) = texture.last();
+    let one = 1 << 20;
+    for mapper in MAPPERS {
+        for len in [1, 2, 3, 5, 17, 240] {
+            for c in [0, -1, -one, -one * 4000] {
+                for (a, u) in [
+                    (-1, 0),
+                    (0, last_u),
+                    (1, last_u),
+                    (1 << 60, last_u),
+                    (-1 << 60, 0),
+                ] {
+                    let stepper = PlaneStepper {
+                        at: [a, -a, c],
+                        step: [0, 0, 0],
+                    };
+                    let v = if a > 0 { 0 } else { last_v };
+                    for at in pixels(&job(stepper, len, mapper), &texture) {
+                        assert_eq!(at, (u, v), "{} of {len}, {stepper:?}", mapper.0);
+                    }
+                }
+            }
+            // c is zero at the last pixel, and at the first, so an end of the span meets it.
+            for (at, step) in [(i64::from(len - 1) * one, -one), (0, one)] {
+                let stepper = PlaneStepper {
+                    at: [one, one, at],
+                    step: [0, 0, step],
+                };
+                let pixels = pixels(&job(stepper, len, mapper), &texture);
+                let zero = if at == 0 { 0 } else { pixels.len() - 1 };
+                let off = (pixels[zero].0 - last_u)
+                    .abs()
+                    .max((pixels[zero].1 - last_v).abs());
+                assert!(off <= 240, "{} of {len}: {:?}", mapper.0, pixels[zero]);
+            }
+        }
+    }
+    assert_eq!(quotients([0, -1, 0], (last_u, last_v)), (last_u, 0));
+}
+
+/// A mapper's errors compared with its bound.
+#[derive(Default)]
+struct Errors {
+    /// The largest error of spans inside the texture, in texels.
+    worst: f64,
+    /// The largest ratio of error to bound where the bound is the closed form: the span is inside the
+    /// texture, and the bound is well below the coordinate's change.
+    closed: f64,
+    /// The largest ratio of all other spans.
+    other: f64,
+    /// The number of spans where the bound is the closed form, and the sum of their ratios.
+    spans: u32,
+    sum: f64,
+}
+
+/// Measures a mapper on random columns, and checks that no error exceeds its bound.
+fn measure(columns: u32, mapper: (&str, Subdivision, bool), random: &mut fastrand::Rng) -> Errors {
+    let texels = vec![0; 1 << 16];
+    let mut errors = Errors::default();
+    for _ in 0..seeded::cases(columns as usize) {
+        let size = (side(random), side(random));
+        let texels = &texels[..usize::from(size.0) * usize::from(size.1)];
+        let texture = Texture::new(texels, size.0, size.1).unwrap();
+        let len = random.u16(1..=240);
+        let stepper = match random.u8(0..16) {
+            0 => any(random, len),
+            _ => seen(random, len, size),
+        };
+        let bounds = SpanBound::new(&stepper, len, &texture);
+        let bound = f64::from(match mapper.2 {
+            true => bounds.linear(mapper.1),
+            false => bounds.quadratic(mapper.1),
+        });
+        let job = job(stepper, len, mapper);
+        let (mut error, mut at) = (0f64, 0);
+        job.pixels(&texture, |(_, i), coordinates| {
+            let off = off(&stepper, i, coordinates, size);
+            if off > error {
+                (error, at) = (off, i);
+            }
+        });
+        assert!(
+            error <= bound + 1e-6,
+            "{}: {error} at {at} of {len} is above {bound}: {stepper:?} on {size:?}, {bounds:?}",
+            mapper.0
+        );
+        let share = error / bound;
+        let inside = |[a, b, c]: [i64; 3]| {
+            let [w, h] = [size.0, size.1].map(i64::from);
+            c > 0 && a >= 0 && b >= 0 && a < w * c && b < h * c
+        };
+        if !inside(stepper.at) || !inside(stepper.after(len - 1)) {
+            errors.other = errors.other.max(share);
+            continue;
+        }
+        errors.worst = errors.worst.max(error / 65536.0);
+        let [from, to] = bounds.ends;
+        let change = (to.0 - from.0).abs().max((to.1 - from.1).abs());
+        // Above 1/32 texel, fixed point adds at most a tenth.
+        if bound > 2048.0 && bound < 0.7 * f64::from(change) {
+            errors.closed = errors.closed.max(share);
+            errors.spans += 1;
+            errors.sum += share;
+        } else {
+            errors.other = errors.other.max(share);
+        }
+    }
+    errors
+}
+
+fn measure_all(columns: u32) {
+    let mut random = seeded::generator();
+    let named = MAPPERS
+        .iter()
+        .filter(|(name, ..)| Mapper::parse(name).is_some());
+    for &mapper in named {
+        let Errors {
+            worst,
+            closed,
+            other,
+            spans,
+            sum,
+        } = measure(columns, mapper, &mut random);
+        println!(
+            "{:13} worst {worst:7.3} texels inside; {:5.1} % of the closed form at most, {:4.1} % in the \
+             mean of {spans} spans; {:5.1} % of other bounds",
+            mapper.0,
+            closed * 100.0,
+            sum / f64::from(spans) * 100.0,
+            other * 100.0
+        );
+        assert!(
+            !seeded::is_whole() || closed >= 0.8,
+            "the bound of {} is loose: {closed}",
+            mapper.0
+        );
+    }
+}
+
+#[test]
+fn no_error_is_above_its_bound_and_the_bound_is_reached() {
+    measure_all(COLUMNS);
+}
+
+/// `cargo test --release -p texmap --test pieces -- --ignored --nocapture`
+#[test]
+#[ignore = "a million columns for each mapper: a minute in a release build"]
+fn no_error_of_a_million_columns_is_above_its_bound() {
+    measure_all(DEEP_COLUMNS);
+}
