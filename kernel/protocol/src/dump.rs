@@ -357,13 +357,20 @@ mod tests {
             let lines = lines(content);
             assert_eq!(lines.len(), 9 + 16 + rows + 1);
             assert_eq!(lines[0], "crystal-ball dump 5");
+            assert_eq!(lines[1], std::format!("content {content:?}").to_lowercase());
             assert_eq!(
                 lines[4..7],
                 ["mapper exact", "frame 4294967295", "motion none"]
             );
             assert!(lines[24].starts_with("palette f0 3f0001 3f0001"));
             assert!(lines[rows + 24].starts_with(last), "{}", lines[rows + 24]);
-            assert!(lines[rows + 25].starts_with(&std::format!("end {} lines ", rows + 25)));
+            let mut all = Checksum::new();
+            for line in &lines[..rows + 25] {
+                all.add(line.as_bytes());
+                all.add(b"\n");
+            }
+            let end = std::format!("end {} lines {:08x}", rows + 25, all.value());
+            assert_eq!(lines[rows + 25], end);
             for line in &lines {
                 let mut sent = Vec::new();
                 crate::write_line(format_args!("{line}"), |bytes| {

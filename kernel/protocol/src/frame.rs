@@ -100,7 +100,7 @@ pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
     writer.flush();
     let sum = writer.checksum.value();
     // The checksum itself must always fit, and is not added to the checksum.
-    writer.room = CHECKSUM + 1;
+    writer.room = CHECKSUM;
     let _ = write!(writer, " *{sum:08x}");
     writer.chunk[writer.collected] = b'\n';
     writer.collected += 1;
@@ -179,6 +179,15 @@ mod tests {
                 .collect();
             assert_eq!(without_checksum(line.trim_end()), Ok(printable.as_str()));
         }
+    }
+
+    /// The kernel sends each chunk with the serial line locked once, so a chunk of one byte would be slow.
+    #[test]
+    fn a_line_is_sent_in_chunks() {
+        let mut lengths = Vec::new();
+        let text = "x".repeat(2 * CHUNK + 1);
+        write_line(format_args!("{text}"), |sent| lengths.push(sent.len()));
+        assert_eq!(lengths, [CHUNK, CHUNK, 1, CHECKSUM + 1]);
     }
 
     #[test]

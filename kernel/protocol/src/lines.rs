@@ -157,6 +157,17 @@ mod tests {
     }
 
     #[test]
+    fn each_error_says_what_is_wrong_with_the_line() {
+        for (error, reason) in [
+            (LineError::TooLong, "longer than 700 bytes"),
+            (LineError::NotText(0xFF), "contains the byte ff"),
+            (LineError::Damaged, "send the line again"),
+        ] {
+            assert!(error.to_string().contains(reason), "{error}");
+        }
+    }
+
+    #[test]
     fn an_illegal_line_does_not_affect_the_next_line() {
         let mut bytes = std::vec![b'x'; 1_000_000];
         bytes.extend_from_slice(b"\nshow 1\n\xFF\nc\x1b[A\nhold\n");
