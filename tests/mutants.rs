@@ -43,6 +43,7 @@ const VISIBLE: &str = "kernel/texmap/src/scan/visible.rs";
 const WITHIN: &str = "kernel/texmap/src/mappers/within.rs";
 const VGA: &str = "boot/vga/src/vga.rs";
 const DRIVER: &str = "kernel/modex/src/driver.rs";
+const DRAWN: &str = "kernel/modex/src/drawn.rs";
 const REGISTERS: &str = "kernel/modex/src/registers.rs";
 
 /// The crates whose tests must kill a mutant of the driver or of the emulated VGA.
@@ -66,9 +67,9 @@ const MUTANTS: &[Mutant] = &[
         "self.bus.purpose(Purpose::Erase);", "self.flip(); self.bus.purpose(Purpose::Erase);"),
     mutant("SR4 left at chain-4", REGISTERS,
         "[0x03, 0x01, ALL_PLANES, 0x00, 0x06]", "[0x03, 0x01, ALL_PLANES, 0x00, 0x0E]"),
-    mutant("erase too small by one line at the bottom", DRIVER,
+    mutant("erase too small by one line at the bottom", DRAWN,
         "self.bottom[group] = bottom;", "self.bottom[group] = bottom - 1;"),
-    mutant("erase too small by one line at the top", DRIVER,
+    mutant("erase too small by one line at the top", DRAWN,
         "self.rise[group] = rise;", "self.rise[group] = rise - 1;"),
     mutant("presented without what the page had before", DRIVER,
         "offscreen.drawn().or(&self.drawn[self.back])", "*offscreen.drawn()"),

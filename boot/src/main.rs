@@ -3,6 +3,7 @@
 mod arguments;
 mod commands;
 mod common;
+mod dispatch;
 mod output;
 
 use std::ffi::OsString;
@@ -42,7 +43,7 @@ fn main() -> ExitCode {
         Cli::command().error(kind, message).exit();
     }
     system::catch_interrupts();
-    match commands::run(cli) {
+    match dispatch::run(cli) {
         Ok(code) => code,
         Err(error) if error.is::<Printed>() => {
             // If standard output is closed, nobody reads the list.

@@ -133,7 +133,7 @@ impl KernelRow {
 
     /// Returns the work that erases, draws and flips a whole frame of the ball in this order.
     pub fn whole_frame(&self) -> Work {
-        whole_frame(self.order)
+        accesses::whole_frame(self.order)
     }
 
     /// Returns the instructions a pixel of a full screen drawn in RAM. They include the cost of each column,
@@ -155,14 +155,6 @@ impl KernelRow {
     /// Returns the time a pixel of `work`, relative to that of `over`, round by round.
     pub fn ratio(&self, work: Work, over: Work) -> TimeRatio {
         self.cost(work).over(self.cost(over))
-    }
-}
-
-/// Returns the work that is a whole frame of the ball in an order.
-fn whole_frame(order: Order) -> Work {
-    match order {
-        Order::Polygons | Order::Planes => Work::FrameCard,
-        Order::Buffer => Work::FramePresented,
     }
 }
 

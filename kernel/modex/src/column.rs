@@ -87,6 +87,36 @@ pub(crate) fn check_row(x: u16, y: u16, len: u16) -> u16 {
     x + more
 }
 
+/// Returns the last screen column of a lane and the line after its last, after checking that the
+/// lane lies in the frame.
+#[inline]
+pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u16) {
+    const {
+        assert!(
+            STEP == STRIDE || STEP == 1,
+            "columns, or every fourth pixel of a row"
+        )
+    };
+    // For an empty lane `more` is 65 535, which leaves the frame as well.
+    let more = u32::from(len.wrapping_sub(1));
+    let (right, down) = if STEP == STRIDE {
+        (0, more)
+    } else {
+        (4 * more, 0)
+    };
+    let (last, line) = (u32::from(x) + right, u32::from(y) + down);
+    if last >= WIDTH as u32 || line >= HEIGHT as u32 {
+        outside(x, y, len, STEP);
+    }
+    (last as u16, line as u16 + 1)
+}
+
+/// Cold path: keeps the panic formatting out of the caller.
+#[cold]
+fn outside(x: u16, y: u16, len: u16, step: usize) -> ! {
+    panic!("{len} pixels, {step} bytes apart, at ({x}, {y}) are not in the frame")
+}
+
 /// A column of one plane: a lane with 80 bytes from pixel to pixel.
 pub type Column<'a> = Lane<'a, STRIDE>;
 

@@ -3,10 +3,10 @@
 use core::fmt;
 
 use crate::column::check_row;
+use crate::drawn::{Drawn, GROUP_BYTES};
 use crate::registers::*;
 use crate::{
     Bus, Destination, HEIGHT, Lane, Offscreen, PAGE_BYTES, PAGES, PLANE_BYTES, Purpose, STRIDE,
-    WIDTH,
 };
 
 /// A colour of the DAC: red, green, blue, 0 to 63 each.
@@ -17,12 +17,6 @@ pub type Palette = [Rgb6; 256];
 /// Reads of Input Status 1 before the driver reports that the card does not respond. They take
 /// seconds, while a refresh takes 17 ms.
 const POLLS: u32 = 10_000_000;
-
-/// Bytes of one wide store, and of one group of the records in [`Drawn`]: 8 bytes, 32 pixels, of a
-/// line.
-const GROUP_BYTES: usize = 8;
-const GROUPS: usize = STRIDE / GROUP_BYTES;
-const GROUP_PIXELS: u16 = 4 * GROUP_BYTES as u16;
 
 /// The reason why Mode X could not be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,87 +96,6 @@ impl fmt::Display for SetError {
 }
 
 impl core::error::Error for SetError {}
-
-/// The parts of a page that were drawn on since the page last held the bare background: for each
-/// group of 32 pixel columns, the lines from a top to a bottom. Both records only grow, and start
-/// at zero, so a lane is added without testing whether its group had any.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Drawn {
-    /// Lines from the top to the page's end.
-    rise: [u16; GROUPS],
-    /// The line after the last.
-    bottom: [u16; GROUPS],
-}
-
-impl Drawn {
-    /// All zeros, so that a value that begins with it takes no space in the kernel's image.
-    pub(crate) const NOTHING: Self = Self {
-        rise: [0; GROUPS],
-        bottom: [0; GROUPS],
-    };
-    pub(crate) const EVERYTHING: Self = Self {
-        rise: [HEIGHT as u16; GROUPS],
-        bottom: [HEIGHT as u16; GROUPS],
-    };
-
-    /// Adds a lane of `len` pixels from (x, y) on.
-    ///
-    /// # Panics
-    /// If the lane leaves the frame.
-    #[inline]
-    pub(crate) fn lane<const STEP: usize>(&mut self, x: u16, y: u16, len: u16) {
-        let (last, bottom) = check_lane::<STEP>(x, y, len);
-        if STEP == STRIDE {
-            self.add_to(usize::from(x / GROUP_PIXELS), y, bottom);
-        } else {
-            self.add(x, last, y, bottom);
-        }
-    }
-
-    /// Adds the pixel columns `first..=last`, lines `top..bottom`, all of which must be in the
-    /// frame.
-    #[inline]
-    pub(crate) fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
-        for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
-            self.add_to(group, top, bottom);
-        }
-    }
-
-    #[inline]
-    fn add_to(&mut self, group: usize, top: u16, bottom: u16) {
-        let rise = HEIGHT as u16 - top;
-        // Most lanes lie beside other lanes and store nothing here.
-        if self.rise[group] < rise {
-            self.rise[group] = rise;
-        }
-        if self.bottom[group] < bottom {
-            self.bottom[group] = bottom;
-        }
-    }
-
-    /// Returns the parts that were drawn on in either record.
-    fn or(&self, other: &Self) -> Self {
-        let mut both = *self;
-        for group in 0..GROUPS {
-            both.add_to(
-                group,
-                HEIGHT as u16 - other.rise[group],
-                other.bottom[group],
-            );
-        }
-        both
-    }
-
-    /// Returns the groups of 8 bytes that were drawn on, counted from the page's start, each with
-    /// its line.
-    pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, usize)> {
-        let lines = self.rise.into_iter().zip(self.bottom);
-        lines.enumerate().flat_map(|(group, (rise, bottom))| {
-            let lines = HEIGHT - usize::from(rise)..usize::from(bottom);
-            lines.map(move |y| (y * GROUPS + group, y))
-        })
-    }
-}
 
 /// The card in Mode X, with its three pages.
 ///
@@ -460,36 +373,6 @@ impl<B: Bus> Destination for Canvas<'_, B> {
             at += u16::from(planes & 1);
         }
     }
-}
-
-/// Returns the last screen column of a lane and the line after its last, after checking that the
-/// lane lies in the frame.
-#[inline]
-pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u16) {
-    const {
-        assert!(
-            STEP == STRIDE || STEP == 1,
-            "columns, or every fourth pixel of a row"
-        )
-    };
-    // For an empty lane `more` is 65 535, which leaves the frame as well.
-    let more = u32::from(len.wrapping_sub(1));
-    let (right, down) = if STEP == STRIDE {
-        (0, more)
-    } else {
-        (4 * more, 0)
-    };
-    let (last, line) = (u32::from(x) + right, u32::from(y) + down);
-    if last >= WIDTH as u32 || line >= HEIGHT as u32 {
-        outside(x, y, len, STEP);
-    }
-    (last as u16, line as u16 + 1)
-}
-
-/// Cold path: keeps the panic formatting out of the caller.
-#[cold]
-fn outside(x: u16, y: u16, len: u16, step: usize) -> ! {
-    panic!("{len} pixels, {step} bytes apart, at ({x}, {y}) are not in the frame")
 }
 
 fn page_start(page: usize) -> usize {

@@ -25,6 +25,7 @@
 mod bus;
 mod column;
 mod count;
+mod drawn;
 mod driver;
 mod offscreen;
 mod planar;

@@ -1,7 +1,7 @@
 //! A page in RAM to draw on and to present.
 
 use crate::column::check_row;
-use crate::driver::Drawn;
+use crate::drawn::Drawn;
 use crate::{Destination, HEIGHT, Lane, Line, PlanarBuffer};
 
 /// A page in RAM that records where it was drawn on.

@@ -2,8 +2,7 @@
 
 use core::ptr::NonNull;
 
-use crate::column::check_row;
-use crate::driver::check_lane;
+use crate::column::{check_lane, check_row};
 use crate::{Destination, HEIGHT, Lane, Line, PAGE_BYTES, STRIDE, WIDTH};
 
 /// Four planes of one page: pixel (x, y) is `planes[x & 3][80 y + x / 4]`.

@@ -2,8 +2,7 @@
 
 use core::ops::Range;
 
-use crate::column::check_row;
-use crate::driver::check_lane;
+use crate::column::{check_lane, check_row};
 use crate::{Destination, Lane, STRIDE, WIDTH};
 
 /// Some columns of a frame, shown at other columns of a destination. Pixels outside these columns

@@ -77,11 +77,13 @@ mod command;
 pub mod dump;
 mod frame;
 mod lines;
+mod setting;
 
 pub use action::{Action, Change};
-pub use command::{Command, CommandError, Content, FailKind, FrameName, Motion, Setting, Word};
+pub use command::{Command, CommandError, Content, FailKind, FrameName, Motion};
 pub use frame::{Checksum, ChecksumError, without_checksum, write_line};
 pub use lines::{LineError, Lines};
+pub use setting::{Setting, Word};
 
 /// Ticks in a second of the machine's time. The demo draws a frame for each tick, as far as the machine keeps
 /// up.

@@ -30,11 +30,14 @@
 
 mod errors;
 pub mod motion;
+mod options;
+mod period;
 mod posed;
 mod quality;
 mod renderer;
 mod surfaces;
 
-pub use posed::{Drawn, PosedScene, RenderOptions};
-pub use renderer::{MAX_JOBS, RenderMemory, SceneRenderer};
+pub use options::{Drawn, RenderOptions};
+pub use posed::{MAX_JOBS, PosedScene};
+pub use renderer::{RenderMemory, SceneRenderer};
 pub use surfaces::SURFACE_BYTES;

@@ -8,32 +8,14 @@ use modex::Destination;
 use scene::clip::{ViewPoint, place};
 use scene::{FOCAL_LENGTH, MAX_FACES, Mesh, Orientation, Pose, lit_level};
 use texmap::plane::Anchor;
-use texmap::{Face, JobList, MAX_SIDES, Mapper, Order, Renderer, Stats, Vertex, Visible};
+use texmap::{Face, JobList, MAX_SIDES, Renderer, Vertex, Visible};
 
-use crate::MAX_JOBS;
+use crate::options::{Drawn, RenderOptions};
 use crate::quality::MapperChoice;
 use crate::surfaces::Surfaces;
 
-/// How a frame is drawn. The default is the default mapper and order, in full quality.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct RenderOptions {
-    /// The mapper in full quality.
-    pub mapper: Mapper,
-    /// The order in which the spans are drawn.
-    pub order: Order,
-    /// The pose one tick after the drawn pose. A face whose motion to this pose hides a mapper's errors is
-    /// drawn in reduced quality, by a faster mapper. `None` draws every face in full quality.
-    pub next: Option<Pose>,
-}
-
-/// Counts of a drawn frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Drawn {
-    /// Polygons, spans and pixels, drawn and dropped.
-    pub stats: Stats,
-    /// Faces that were drawn in reduced quality.
-    pub reduced: u32,
-}
+/// Most jobs that are collected before they are drawn.
+pub const MAX_JOBS: usize = 4096;
 
 /// A scene in a pose, as [`SceneRenderer::at`](crate::SceneRenderer::at) returns it.
 #[derive(Debug)]

@@ -8,7 +8,7 @@ use scene::{FOCAL_LENGTH, Orientation, Pose, Vec3};
 use texmap::plane::Anchor;
 use texmap::{Face, Mapper};
 
-use crate::RenderOptions;
+use crate::options::RenderOptions;
 
 /// The motion from one pose of the solid to another.
 #[derive(Clone, Copy, Debug)]

@@ -5,11 +5,9 @@ use scene::clip::ViewPoint;
 use scene::{MAX_CORNERS, MAX_EXTENT, MAX_FACES, MAX_VERTICES, Mesh, Pose, Scene};
 use texmap::{JobList, Texture, Visible};
 
-use crate::posed::{Drawn, PosedScene, RenderOptions};
+use crate::options::{Drawn, RenderOptions};
+use crate::posed::{MAX_JOBS, PosedScene};
 use crate::surfaces::{SURFACE_BYTES, Surfaces};
-
-/// Most jobs that are collected before they are drawn.
-pub const MAX_JOBS: usize = 4096;
 
 /// Fixed arenas for drawing.
 #[derive(Clone, Copy, Debug)]

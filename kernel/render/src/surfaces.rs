@@ -8,7 +8,7 @@ use modex::Palette;
 use scene::{LIGHT_LEVELS, MATERIALS, Scene};
 use texmap::{Texture, Vertex};
 
-use crate::motion::half_period;
+use crate::period::half_period;
 
 /// Room for a scene's textures, padded, with a copy for each light level: one texture of the largest size.
 pub const SURFACE_BYTES: usize = 3 << 19;

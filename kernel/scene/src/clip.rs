@@ -34,7 +34,7 @@
 //! # How many corners
 //!
 //! A plane adds at most one corner to a convex polygon: [`MAX_CORNERS`](crate::MAX_CORNERS) of a face and
-//! [`PLANES`] new corners make [`MAX_SIDES`]. (Turning rounds vertices, so a face of four or more corners
+//! [`CLIP_PLANES`] new corners make [`MAX_SIDES`]. (Turning rounds vertices, so a face of four or more corners
 //! that is seen exactly edge-on may be bent by 2^-16 unit. Only a face of nearly `MAX_CORNERS` corners, bent
 //! many times over, could get too many corners. It would be dropped and counted.)
 
@@ -42,10 +42,8 @@ use modex::{HEIGHT, WIDTH};
 use texmap::{MAX_COORDINATE, MAX_SIDES, SUBPIXELS, Vertex};
 
 use crate::camera::{FOCAL_LENGTH, NEAR, project, project_fine};
+use crate::mesh::CLIP_PLANES;
 use crate::{Corner, Vec3};
-
-/// Number of clip planes.
-pub const PLANES: usize = 5;
 
 /// Fraction bits of a corner beyond the 16 of a vertex.
 const FINE: u32 = 28;
@@ -60,7 +58,7 @@ struct ClipPlane {
 }
 
 /// The clip planes, in the order in which they cut.
-static CLIPS: [ClipPlane; PLANES] = {
+static CLIPS: [ClipPlane; CLIP_PLANES] = {
     const fn guard(form: [i64; 3]) -> ClipPlane {
         ClipPlane { form, least: 0 }
     }

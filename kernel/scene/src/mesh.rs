@@ -2,15 +2,15 @@
 
 use texmap::MAX_SIDES;
 
-use crate::clip::PLANES;
-
+/// Number of planes that a face is clipped at.
+pub(crate) const CLIP_PLANES: usize = 5;
 /// Most vertices of a mesh.
 pub const MAX_VERTICES: usize = 4096;
 /// Most faces of a mesh that is not convex. Such a mesh's faces keep their numbers until the frame is drawn.
 pub const MAX_FACES: usize = 8192;
 /// Most corners of a face. Clipping may add a corner at each of five planes, and the result must still be a
 /// polygon of at most [`MAX_SIDES`] sides.
-pub const MAX_CORNERS: usize = MAX_SIDES - PLANES;
+pub const MAX_CORNERS: usize = MAX_SIDES - CLIP_PLANES;
 /// Largest coordinate of a mesh's vertex, either sign, 16.16: 64 units. After any turn it is below 2^23, and
 /// at [`Pose::MAX_DISTANCE`](crate::Pose::MAX_DISTANCE) below 2^24.
 pub const MAX_EXTENT: i32 = 64 << 16;

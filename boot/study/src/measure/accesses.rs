@@ -69,7 +69,7 @@ impl<'a> EmulatedBenches<'a> {
     /// # Errors
     /// Accesses that are faults, and counts that differ from frame to frame.
     pub fn accesses(&mut self, mapper: Mapper, order: Order) -> anyhow::Result<Accesses> {
-        let work = super::whole_frame(order);
+        let work = whole_frame(order);
         let bench = &mut self.counted;
         bench.set(mapper, order);
         // This work puts the ball on every page.
@@ -150,4 +150,12 @@ fn check<B: Bus>(bench: &mut Bench<'_, B>, mapper: Mapper, order: Order) -> Vec<
     });
     answer.pop();
     answer
+}
+
+/// Returns the work that is a whole frame of the ball in an order.
+pub fn whole_frame(order: Order) -> Work {
+    match order {
+        Order::Polygons | Order::Planes => Work::FrameCard,
+        Order::Buffer => Work::FramePresented,
+    }
 }
