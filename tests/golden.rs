@@ -296,7 +296,7 @@ fn missing_wrong_and_stray_files_in_a_golden_folder_are_found() {
     }
     std::fs::write(at("belt.txt"), "").unwrap();
     std::fs::remove_file(at("belt.toml")).unwrap();
-    refused("neither a description nor a PNG");
+    refused("neither a description (.toml) nor a PNG");
     std::fs::remove_file(at("belt.txt")).unwrap();
     refused("has no golden frames");
 }

@@ -128,7 +128,7 @@ fn a_damaged_model_file_is_reported_and_the_built_in_scenes_still_work() {
     machine.wait_until_running().unwrap();
     let answer = machine.model_answer().unwrap().to_string();
     assert!(
-        answer.starts_with("refused model: its header says checksum "),
+        answer.starts_with("refused model: the header states checksum "),
         "{answer}"
     );
     let mut memory = backend::memory();
