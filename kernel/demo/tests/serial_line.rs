@@ -3,10 +3,10 @@
 mod common;
 
 use common::{ask, carry_out, memory};
-use demo::Demo;
+use demo::{Demo, Request};
 use modex::Purpose;
 use modex::registers::MISC_WRITE;
-use protocol::Reception;
+use protocol::{Command, FailKind, Reception};
 use vga::Vga;
 
 /// Returns how often the card's mode was set.
@@ -77,4 +77,16 @@ fn the_state_contains_the_errors_of_the_line() {
     });
     let errors = "serial overruns 1 damaged 2 full 3";
     assert_eq!(last(&mut demo).as_deref(), Some(errors));
+}
+
+#[test]
+fn only_leave_and_fail_ask_the_machine_for_something() {
+    let mut memory = memory();
+    let mut demo = Demo::new(&mut memory, Vga::new(), None).unwrap();
+    let mut request = |command| demo.obey(command, 0, &mut |_| {});
+    assert_eq!(request(Command::Hold), None);
+    assert_eq!(request(Command::ShowAt(1)), None);
+    assert_eq!(request(Command::Leave), Some(Request::Leave));
+    let panic = FailKind::Panic;
+    assert_eq!(request(Command::Fail(panic)), Some(Request::Fail(panic)));
 }
