@@ -1,4 +1,4 @@
-//! The parts of the `crystal-ball` command that its tests use too.
+//! The parts of the `crystal-ball` command that the tests also use.
 
 pub mod window;
 

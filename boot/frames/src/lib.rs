@@ -1,4 +1,4 @@
-//! Frames on the host: drawing them on a VGA, dumps, PNGs, comparison, golden frames, recordings.
+//! Handles frames on the host: drawing, dumps, PNGs, comparison, golden frames, recordings and replay.
 //!
 //! Nothing here starts QEMU. Functions that need a VGA are generic over [`backend::Backend`], which QEMU's
 //! VGA and the emulated VGA implement.

@@ -1,5 +1,5 @@
-//! `crystal-ball-image KERNEL OUT [RAMDISK]` writes a disk image that boots the kernel on a PC BIOS and hands
-//! it the ramdisk, if one is given.
+//! `crystal-ball-image KERNEL OUT [RAMDISK]` writes a disk image that boots the kernel on a PC BIOS and
+//! passes the kernel the ramdisk, if the command line names one.
 //!
 //! This is a separate program, outside the workspace, because the `bootloader` crate builds its BIOS stages
 //! with a compiler that has its library sources: the pinned compiler, not the user's.

@@ -11,12 +11,12 @@
 //!
 //! ```text
 //! OBJ -> polygons on the grid -> layout of the texture -> mesh   \
-//! PNG ------------------------> cut from the repeated image     > model file -> ramdisk, emulated card
+//! PNG ------------------------> cut from the repeated image     > model file -> ramdisk, emulated VGA
 //!                               -> texels, palette, light table  /
 //! ```
 //!
-//! All work is done here, once, in floating point where that is easier. The result consists of integers
-//! ([`model`] has the format), and the same files give the same result.
+//! The importer does all of this once, in floating point where that is easier. The result consists of
+//! integers (the crate [`model`] defines the format), and the same files give the same result.
 
 pub mod colour;
 mod file_kind;

@@ -7,8 +7,8 @@
 //! - QMP, QEMU's control socket: the reason of the `SHUTDOWN` event;
 //! - the code that the kernel wrote to `isa-debug-exit`.
 //!
-//! QEMU's exit code 0 is not a source: a triple fault, a closed window and a QEMU that was ended by a signal
-//! all give it.
+//! QEMU's exit code 0 is not a source, because a triple fault, a closed window and a signal that ends QEMU
+//! all give this code.
 //!
 //! The command line of a configuration needs no boot:
 //!

@@ -1,9 +1,9 @@
-//! Provides everything that a boot needs, on the first `cargo run` or `cargo test`, without a step by hand.
+//! Provides everything that a boot needs, on the first `cargo run` or `cargo test`, without manual steps.
 //!
 //! It provides what a run needs and a new machine lacks: the pinned compiler with its library sources, the
 //! boot loader built by that compiler, the kernel, the disk image, and QEMU. The user needs only a stable
-//! cargo. Build scripts cannot do this work, because a nested cargo in the same target folder waits for
-//! ever, so the host program does it.
+//! cargo. Build scripts cannot do this work, because a nested cargo in the same target folder would wait
+//! forever, so the host program does it.
 //!
 //! The set-up is one locked step. Every run does it, and so does every test that boots: cargo-nextest runs
 //! each test in a separate process, and the set-up never assumes that another process has finished. A cache

@@ -1,4 +1,5 @@
-//! The cost of accuracy: each mapper's error on the host, its cost in RAM, and its cost in the kernel.
+//! Measures the cost of accuracy: each mapper's error on the host, its cost in RAM, and its cost in the
+//! kernel.
 //!
 //! [`trade`] measures all three, and writes tables, plots and a page. [`measure`] runs the benchmark kernel
 //! and reads its answers.
@@ -18,7 +19,7 @@
 //!         accuracy.errors.largest()
 //!     })
 //! });
-//! // In texels: affine mapping deviates on a tilted square; the exact mapper has an error in the last bit.
+//! // In texels: affine mapping has a large error on a tilted square, the exact mapper one of the last bit.
 //! assert!(largest[0] > 4.0);
 //! assert!(largest[1] < 1.0 / 65_535.0);
 //! ```

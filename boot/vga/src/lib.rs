@@ -14,23 +14,23 @@
 //! assert!(vga.take_faults().is_empty());
 //! ```
 //!
-//! It models, block by block, what the project's scenes use and nothing else. QEMU draws an image from almost
-//! any register values; real cards blank, garble or drop writes. So anything that hardware would not show as
-//! intended is a [`Fault`] here. So is every register, value, port or address that no scene uses: a feature
-//! comes with the scene that needs it.
+//! This emulated VGA models, block by block, what the project's scenes use and nothing else. QEMU draws an
+//! image from almost any register values; real cards blank, garble or drop writes. So an access that hardware
+//! would not perform as intended is a [`Fault`] here. An access to a register, value, port or address that no
+//! scene uses is a fault too: a feature comes with the scene that needs it.
 //!
 //! - `sequencer`, `graphics`, `crtc`, `attribute`, `dac`, `memory`: a file for each block of the chip, with
 //!   its registers and their effect;
 //! - `monitor`: the times that the CRTC's registers give a monitor, and the times that it needs;
-//! - [`Vga`]: the whole card. It decodes ports and the window, and implements [`modex::Bus`], so the driver
-//!   and the renderer run on it as they do on the bare machine;
+//! - [`Vga`]: the whole card, which decodes ports and the window, and implements [`modex::Bus`], so the
+//!   driver and the renderer run on it as they do on the bare machine;
 //! - [`scanout`]: the image that the monitor shows, derived from the registers.
 //!
 //! # Faults
 //!
 //! A fault is recorded, and the access then does what the chip would do. If a [`Vga`] is dropped while it
-//! holds faults that nobody took, it panics and lists them: a test that causes a fault fails even if it does
-//! not check for faults.
+//! holds faults that nobody took, the [`Vga`] panics and lists them. So a test that causes a fault fails even
+//! if it does not check for faults.
 //!
 //! # Values
 //!

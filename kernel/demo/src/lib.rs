@@ -1,4 +1,4 @@
-//! The demo: draws one frame after the other and answers commands.
+//! The demo: draws frames, one after the other, and answers commands.
 //!
 //! A running demo draws the frame of each tick for as long as the machine keeps up, and skips ticks when it
 //! does not, so the motion keeps its pace. A held demo draws what `show` names and touches no video memory
@@ -7,9 +7,9 @@
 //! Keys and commands steer a running demo (`steering`). The demo logs them (`log`), and a held demo draws the
 //! frame of any tick from that log.
 //!
-//! The demo knows nothing of the machine. It has a card behind a [`modex::Bus`], receives bytes, writes
-//! lines, and gets the tick as an argument. The kernel passes the bare machine's card and its serial line; a
-//! test passes the emulated VGA and a list. The same commands then give the same answers.
+//! The demo does not depend on the machine. It draws on a card behind a [`modex::Bus`], receives bytes,
+//! writes lines, and gets the tick as an argument. The kernel passes the bare machine's card and its serial
+//! line; a test passes the emulated VGA and a list. The same commands then give the same answers.
 //!
 //! # Example
 //!

@@ -1,13 +1,14 @@
-//! Model files: the file format of a model, for the kernel and for the host program with the emulated VGA.
+//! Model files: the file format of a user's model, for the kernel and for the host program.
 //!
-//! The host computes everything once: mesh, texels, palette and light table. Kernel and host then read the
-//! same bytes, so they draw the same frame, and a model file's checksum identifies the model.
+//! The host computes mesh, texels, palette and light table once, on import. The kernel and the emulated VGA's
+//! demo then read the same bytes, so they draw the same frame, and a model file's checksum identifies the
+//! model.
 //!
 //! # The format, version 1
 //!
 //! All numbers are little-endian, and the parts follow each other without gaps:
 //!
-//! | bytes | what |
+//! | bytes | contents |
 //! | --- | --- |
 //! | 8 | [`MAGIC`] |
 //! | 4 | [`VERSION`] |
@@ -21,7 +22,7 @@
 //! | W x H | texels, row by row from the top left |
 //! | V x 12 | vertices: x right, y down, z away from the viewer, signed, 16.16 |
 //! | C x 10 | corners of all faces: 2 bytes of vertex index, 4 of u and 4 of v in the texture, 16.16 texels |
-//! | F x 8 | faces: 2 bytes with the number of corners, which follow those of the face before; three times 2 bytes of the outward unit normal, signed, 14 fraction bits |
+//! | F x 8 | faces: 2 bytes with the number of corners, which follow the corners of the face before; three times 2 bytes of the outward unit normal, signed, 14 fraction bits |
 //!
 //! A texel is not a colour: the light table turns it into a colour. So texels and palette can be reduced
 //! independently.
@@ -30,7 +31,7 @@
 //!
 //! [`ModelFile::parse`] trusts nothing, because the bytes may come from anywhere. The checksum finds any
 //! accidental change. But a model file can be forged with a matching checksum, so every count, index and
-//! range is also checked. A scene made of an accepted model file is within every limit of the renderer and
+//! range is also checked. A scene from an accepted model file is within every limit of the renderer and
 //! the mappers, and cannot make them panic. Whether the scene looks good is not checked: faces may be bent,
 //! inside out or invisible.
 //!

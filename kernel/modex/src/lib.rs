@@ -1,23 +1,23 @@
-//! VGA Mode X, 320x240 in 256 colours, by its registers.
+//! Drives VGA Mode X, 320 x 240 pixels in 256 colours, through the VGA's registers.
 //!
 //! # Layout of video memory
 //!
 //! Unchained 256-colour memory consists of four planes of 64 KiB behind one window of 64 KiB. Pixel
 //! (x, y) of a page lies in plane `x & 3` at `start + 80 y + x / 4`. The Map Mask register selects
 //! the planes that a store reaches. A step to the right changes the plane, and a step down does
-//! not. That is why the renderer draws columns and writes Map Mask once for each.
+//! not. Therefore the renderer draws columns and writes Map Mask once for each column.
 //!
 //! # Three parts
 //!
-//! - [`registers`]: the datasheet. Ports, indices and the mode as a table; no access to hardware.
+//! - [`registers`]: the datasheet: ports, indices, and the mode as a table; no access to hardware.
 //! - [`Bus`]: port and memory access. The bare machine implements it for the hardware, and tests
-//!   implement it with a recorder. The trait is open, so that anyone can plug in a model of the
-//!   card.
+//!   implement it with a recorder or the emulated VGA. Any other model of a card can implement it
+//!   too.
 //! - [`ModeX`]: the driver. It sets the mode from the table and reads it back, owns the three
-//!   pages, records which parts of each were drawn on, erases only these, and flips in the order
-//!   that is safe on every card.
+//!   pages, records which parts of each page were drawn on, erases only these parts, and flips in
+//!   the order that is safe on every card.
 //!
-//! [`Destination`] is the only contract by which a texture mapper writes pixels. [`Canvas`] (a page
+//! [`Destination`] is the trait through which the renderer writes pixels. [`Canvas`] (a page
 //! of the card), [`PlanarBuffer`] (a page of the same layout in RAM), [`Offscreen`] (a page in RAM
 //! that can be presented) and [`Window`] (a part of any of them) implement it.
 #![no_std]

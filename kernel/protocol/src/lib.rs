@@ -1,4 +1,4 @@
-//! The serial protocol between kernel and host: both ends of it.
+//! The serial protocol between kernel and host, for both ends.
 //!
 //! The protocol is text, one line at a time, so that a person at a terminal can use it and `diff` can compare
 //! transcripts. The kernel's lines end in a checksum:
@@ -12,12 +12,12 @@
 //! CR LF. Lines are printable ASCII, at most [`MAX_LINE`] bytes. Backspace and Delete remove the last byte of
 //! the line, and the byte [`CANCEL`] (Ctrl-X) removes all of the line so far.
 //!
-//! The kernel does not echo what it receives: a person at a terminal sees only the answers, and switches
-//! the terminal's echo on. If a terminal starts each line where the line before ended, it has to add a CR to
-//! each LF: `picocom --echo --imap lfcrlf` does both.
+//! The kernel does not echo, so a person at a terminal sees only the answers unless the terminal echoes
+//! locally. If a terminal starts each line where the line before ended, it has to add a CR to each LF:
+//! `picocom --echo --imap lfcrlf` does both.
 //!
-//! The kernel receives at any time, also while it draws. If the UART has lost a byte of a line, or a byte of
-//! it arrived damaged, the kernel answers the line with `error` and does not carry it out. If the loss is
+//! The kernel receives at any time, also while it draws. If the UART lost a byte of a line, or a byte of the
+//! line arrived damaged, the kernel answers the line with `error` and does not carry it out. If the loss is
 //! between two lines, the kernel refuses both.
 //!
 //! The host sends one [`Command`] a line. The host may end the line in a checksum too, and the kernel then
@@ -39,7 +39,7 @@
 //! | `dump`, `dump all` | a [`dump`] |
 //! | `checksums`, `checksums all` | `page start 4b00 crc ...`, `palette crc ...`, with `all` four of `plane 0 crc ...` |
 //! | `registers` | a line for each block: `sequencer 03 01 08 00 06`, ... |
-//! | `counts` | `frame polygons 228 columns ...`, and a line for each purpose: `draw ports 3460 map-mask ...` |
+//! | `counts` | `frame polygons 228 columns ...`, a line for each purpose: `draw ports 3460 map-mask ...`, the pace of a running demo: `pace frames ...`, and `keys taken ...` |
 //! | `state` | `held` or `running tick 99`, `scene ball`, `mapper shifts`, `order polygons`, `frame 480`, `motion none` (a motion if the frame has faces in reduced quality), `drawn shifts` (the frame's mapper; `none` without a frame), `page 1 start 4b00`, `serial overruns 0 damaged 0 full 0` ([`Reception`]) |
 //! | `version` | `crystal-ball 0.1.0 protocol 7 dump 5` |
 //! | `fail KIND` | no answer: the kernel fails in the named way ([`FailKind`]) |
@@ -52,7 +52,7 @@
 //! - `loaded model 1a2b3c4d`, with the model file's checksum, or `refused model: ...`, with the reason: right
 //!   after `hello`, if the boot loader has loaded a ramdisk;
 //! - `running`: the first frame is on the screen;
-//! - `panic ...`, `exception ...`, `adapter ...`, and lines with details, then [`END_OF_REPORT`].
+//! - `panic ...`, `exception ...` or `adapter ...`, then lines with details, then [`END_OF_REPORT`].
 //!
 //! # Example
 //!

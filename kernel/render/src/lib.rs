@@ -1,9 +1,9 @@
-//! Frames of a scene: scene, pose and options in, pixels out.
+//! Draws frames of a scene: scene, pose and options in, pixels out.
 //!
 //! A [`SceneRenderer`] prepares a scene: it checks the limits and lights the textures. [`SceneRenderer::at`]
 //! turns the scene into a pose: it projects the vertices, and finds which face is visible at each pixel. The
 //! [`PosedScene`] then draws any number of frames, each with its own [`RenderOptions`], and measures the
-//! mapper's error and the texture's motion. Nothing else reaches a frame: no clock and no history.
+//! mapper's error and the texture's motion. A frame depends on nothing else: no clock and no history.
 //!
 //! All memory is in a [`RenderMemory`], whose limits are checked when the scene is set. All arithmetic is in
 //! integers and fixed point, so the host and the bare machine produce the same bits.

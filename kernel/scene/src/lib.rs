@@ -1,4 +1,4 @@
-//! Scenes as data: meshes, textures, palette, light, poses, and the camera.
+//! Describes scenes as data: meshes, textures, palette, light, poses, and the camera.
 //!
 //! A frame is a function of scene, options and pose alone: no clock and no history reaches it.
 //! [`Pose::at_tick`] makes the pose of a frame number. The crate `render` draws the frame.

@@ -1,11 +1,10 @@
 //! Texture mapping by columns: polygons to pixels.
 //!
-//! Drawing has two steps. First, a [`Mapper`] turns a face into jobs: the [scan] finds the spans of
-//! pixels in each screen column that lie inside the face's polygon, and the mapper adds the texture
-//! coordinates at the first of these pixels and the steps to the next. Then a [`Renderer`] draws
-//! the jobs in the chosen [`Order`], through a [`modex::Destination`]. The code that draws a job
-//! sees one span of pixels; it depends neither on the order of the jobs nor on what lies behind the
-//! span.
+//! Drawing has two steps. First, a face becomes jobs: the [scan] finds the spans of pixels in each
+//! screen column (or row) that lie inside the face's polygon, and a [`Mapper`] adds a stepper to each
+//! span: the texture coordinates of its first pixel and how they advance. Then a [`Renderer`] draws
+//! the jobs in the chosen [`Order`], through a [`modex::Destination`]. The code that draws a job sees
+//! one span of pixels; it depends neither on the order of the jobs nor on the faces behind the span.
 //!
 //! Integers decide pixels: coverage is exact, and everything else is fixed point with a range that
 //! is stated where the type is defined. So the host and the bare machine produce the same bits.

@@ -1,8 +1,8 @@
 //! The column loops alone: a frame of 320 columns of 200 pixels in RAM.
 //!
-//! `cargo bench -p texmap` prints cycles a pixel, and what they are of the bare loop's in the same
-//! order and of the packed loop's in x order. Times are ratios within one run: the rounds go
-//! through all loops in turn, and a row has the medians.
+//! `cargo bench -p texmap` prints cycles a pixel, and their ratios to the bare loop in the same order
+//! and to the packed loop in x order. Compare times only within one run: each round measures all
+//! loops in turn, and a row has the medians.
 
 mod work;
 

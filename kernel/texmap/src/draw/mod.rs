@@ -1,8 +1,8 @@
 //! Drawing: this folder decides in which order the spans of a frame are written, and how each is
 //! written to a column, to a row or to a plane of a row.
 //!
-//! A job is a mapped span with its texture. A bounded list holds the jobs of a frame; a full list
-//! is drawn and emptied.
+//! A job is a mapped span with its texture. A bounded list holds the jobs of a frame; when the list
+//! is full, the renderer draws its jobs and empties it.
 
 pub(crate) mod job;
 pub(crate) mod job_list;

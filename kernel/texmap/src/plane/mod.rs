@@ -1,5 +1,5 @@
 //! The plane of a texture in space: this folder decides the exact texture coordinates of every
-//! pixel, and how far an approximation of them may be off.
+//! pixel, and bounds the error of an approximation.
 //!
 //! [`Plane`] defines the coordinates. [`bounds`] is the one place for error bounds.
 

@@ -1,4 +1,4 @@
-//! Faces to map, and checks that they are drawn as their jobs say.
+//! Faces to map, and checks that the renderer draws them as their jobs say.
 
 use modex::{Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Tally};
 use texmap::plane::Anchor;
