@@ -1,5 +1,5 @@
 //! Shows that checks can fail: those of the emulated VGA, of the Mode X driver, of coverage, of mappers that
-//! stay within an error and of visible spans. CargoRun by `cargo named-mutants`.
+//! stay within an error and of visible spans. Run by `cargo named-mutants`.
 //!
 //! A mutant is a plausible mistake that is planted into a copy of the workspace: in the driver, in the
 //! emulated VGA that should detect the driver's mistakes, or in the renderer. The tests of the affected
