@@ -33,10 +33,10 @@
 //!
 //! # How many corners
 //!
-//! A plane adds at most one corner to a convex polygon: [`MAX_CORNERS`](crate::MAX_CORNERS) of a face and
-//! [`CLIP_PLANES`] new corners make [`MAX_SIDES`]. (Turning rounds vertices, so a face of four or more corners
-//! that is seen exactly edge-on may be bent by 2^-16 unit. Only a face of nearly `MAX_CORNERS` corners, bent
-//! many times over, could get too many corners. It would be dropped and counted.)
+//! A plane adds at most one corner to a convex polygon: [`MAX_CORNERS`](crate::MAX_CORNERS) of a face and a new
+//! corner at each of the five planes make [`MAX_SIDES`]. (Turning rounds vertices, so a face of four or more
+//! corners that is seen exactly edge-on may be bent by 2^-16 unit. Only a face of nearly `MAX_CORNERS` corners,
+//! bent many times over, could get too many corners. It would be dropped and counted.)
 
 use modex::{HEIGHT, WIDTH};
 use texmap::{MAX_COORDINATE, MAX_SIDES, SUBPIXELS, Vertex};
