@@ -1,6 +1,6 @@
-//! VGAs that the demo runs on: QEMU's and the emulated VGA.
+//! VGAs that the demo runs on: QEMU's VGA and the emulated VGA.
 //!
-//! Both implement [`Card`]: they accept the same commands and return the same kinds of evidence, so the
+//! Both implement [`Backend`]: they accept the same commands and return the same kinds of evidence, so the
 //! answers of one can be compared with the answers of the other. They share the program (driver and renderer)
 //! but not the way to the evidence. The kernel reads QEMU's video memory through Read Map and the palette
 //! through the DAC's read port, and QEMU captures its screen. The emulated VGA is inspected from outside, and
@@ -37,7 +37,7 @@ pub trait Backend {
     /// Returns the contents of video memory, with the palette.
     ///
     /// # Errors
-    /// As [`Backend::ask`], and an answer that is not a valid dump.
+    /// As [`Backend::send`], and an answer that is not a valid dump.
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump>;
 
     /// Returns the image that the monitor shows.
@@ -49,7 +49,7 @@ pub trait Backend {
     /// Holds and resets the demo, and shows `frames` one after the other with the default options.
     ///
     /// # Errors
-    /// As [`Backend::ask`].
+    /// As [`Backend::send`].
     fn show(&mut self, frames: &[FrameName]) -> anyhow::Result<()> {
         self.show_with(&FrameOptions::default(), frames)
     }
@@ -57,7 +57,7 @@ pub trait Backend {
     /// Does the same as [`Backend::show`], with `options`.
     ///
     /// # Errors
-    /// As [`Backend::ask`].
+    /// As [`Backend::send`].
     fn show_with(&mut self, options: &FrameOptions, frames: &[FrameName]) -> anyhow::Result<()> {
         self.send(Command::Hold)?;
         for command in options.commands() {
