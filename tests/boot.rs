@@ -45,9 +45,9 @@ fn short_limits() -> Limits {
 
 #[test]
 fn the_registers_have_the_values_of_the_table() {
-    let mut machine = boot();
-    machine.send(Command::Show(FrameName::Number(0))).unwrap();
-    let answer = machine.send(Command::Registers).unwrap();
+    let mut vm = boot();
+    vm.send(Command::Show(FrameName::Number(0))).unwrap();
+    let answer = vm.send(Command::Registers).unwrap();
     for ((block, expected), line) in MODE_X.blocks().into_iter().zip(&answer) {
         let (name, values) = line.split_once(' ').unwrap();
         assert_eq!(name, block);
@@ -67,27 +67,27 @@ fn the_registers_have_the_values_of_the_table() {
         assert_eq!(read, expected, "{block}");
     }
     assert_eq!(answer.len(), MODE_X.blocks().len());
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
 /// Returns the frames shown, late frames and ticks of the running demo, or `None` if the demo is held.
-fn pace(machine: &mut Vm) -> Option<[u32; 3]> {
-    let counts = machine.send(Command::Counts).unwrap();
+fn pace(vm: &mut Vm) -> Option<[u32; 3]> {
+    let counts = vm.send(Command::Counts).unwrap();
     let pace = counts.iter().find(|line| line.starts_with("pace "))?;
     let fields: Vec<_> = pace.split(' ').collect();
     Some([fields[2], fields[4], fields[6]].map(|number| number.parse().unwrap()))
 }
 
-/// Under `-icount` the machine's time is its number of instructions, so a busy host cannot slow it down:
-/// every tick has its frame.
+/// Checks that every tick has its frame. Under `-icount` the machine's clock counts instructions, so a busy
+/// host cannot slow the machine down.
 #[test]
 fn each_tick_has_its_frame() {
-    let mut machine = boot_with(&["-icount", "shift=2"], Limits::default());
-    machine.wait_until_running().unwrap();
-    let [frames, late, ticks] = pace(&mut machine).unwrap();
+    let mut vm = boot_with(&["-icount", "shift=2"], Limits::default());
+    vm.wait_until_running().unwrap();
+    let [frames, late, ticks] = pace(&mut vm).unwrap();
     let (frames, late, ticks) = loop {
-        machine.rest(Duration::from_millis(50)).unwrap();
-        let [frames_then, late_then, ticks_then] = pace(&mut machine).unwrap();
+        vm.rest(Duration::from_millis(50)).unwrap();
+        let [frames_then, late_then, ticks_then] = pace(&mut vm).unwrap();
         if ticks_then - ticks >= 30 {
             break (frames_then - frames, late_then - late, ticks_then - ticks);
         }
@@ -97,27 +97,27 @@ fn each_tick_has_its_frame() {
         frames.abs_diff(ticks) <= 1,
         "{frames} frames in {ticks} ticks"
     );
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
 #[test]
 fn the_running_demo_keeps_its_pace_and_can_be_held() {
-    let mut machine = boot();
-    machine.wait_until_running().unwrap();
-    // A busy host deprives the machine of time, so that ticks are lost; it never adds any. So among some
-    // seconds at least one must have nearly all of its sixty ticks, unless QEMU had to wait for a processor
-    // in each of them.
+    let mut vm = boot();
+    vm.wait_until_running().unwrap();
+    // A busy host deprives the machine of time, so that ticks are lost; a busy host never adds ticks. So at
+    // least one of twenty seconds must have nearly all of its sixty ticks, unless QEMU had to wait for a
+    // processor in every second.
     let mut undisturbed = 0;
     let paced = (0..20).any(|_| {
-        let (since, starved) = (Instant::now(), machine.starved_time());
-        let [frames, _, ticks] = pace(&mut machine).unwrap();
-        machine.rest(Duration::from_secs(1)).unwrap();
-        let [frames_then, _, ticks_then] = pace(&mut machine).unwrap();
+        let (since, starved) = (Instant::now(), vm.starved_time());
+        let [frames, _, ticks] = pace(&mut vm).unwrap();
+        vm.rest(Duration::from_secs(1)).unwrap();
+        let [frames_then, _, ticks_then] = pace(&mut vm).unwrap();
         let (shown, ticked) = (frames_then - frames, ticks_then - ticks);
         let most = since.elapsed().as_millis() as u32 * 61 / 1000 + 3;
         assert!(ticked <= most, "{ticked} ticks in {:?}", since.elapsed());
         assert!(shown <= ticked + 1, "{shown} frames in {ticked} ticks");
-        let starved = machine.starved_time().saturating_sub(starved);
+        let starved = vm.starved_time().saturating_sub(starved);
         undisturbed += u32::from(starved < Duration::from_millis(20));
         ticked >= 55 && shown >= 30
     });
@@ -126,23 +126,23 @@ fn the_running_demo_keeps_its_pace_and_can_be_held() {
         "no second of twenty had its ticks and frames, though nothing disturbed {undisturbed} of them"
     );
 
-    machine.send(Command::Hold).unwrap();
-    assert_eq!(pace(&mut machine), None);
-    let still = machine.screen().unwrap();
-    machine.rest(Duration::from_millis(300)).unwrap();
-    assert!(still == machine.screen().unwrap(), "the held frame changed");
-    machine.send(Command::Run).unwrap();
-    machine.wait_until_running().unwrap();
-    machine.leave().unwrap();
+    vm.send(Command::Hold).unwrap();
+    assert_eq!(pace(&mut vm), None);
+    let still = vm.screen().unwrap();
+    vm.rest(Duration::from_millis(300)).unwrap();
+    assert!(still == vm.screen().unwrap(), "the held frame changed");
+    vm.send(Command::Run).unwrap();
+    vm.wait_until_running().unwrap();
+    vm.leave().unwrap();
 }
 
 /// Presses keys until the log has a change that ends in `change`, and returns the log. QEMU passes keys on
-/// with a delay, and drops those that do not fit its buffer.
-fn logged(machine: &mut Vm, change: &str, press: impl Fn(&mut Vm)) -> Vec<String> {
+/// with a delay, and drops keys that do not fit its buffer.
+fn logged(vm: &mut Vm, change: &str, press: impl Fn(&mut Vm)) -> Vec<String> {
     for _ in 0..600 {
-        press(machine);
-        machine.rest(Duration::from_millis(50)).unwrap();
-        let log = machine.send(Command::Log).unwrap();
+        press(vm);
+        vm.rest(Duration::from_millis(50)).unwrap();
+        let log = vm.send(Command::Log).unwrap();
         if log.iter().any(|line| line.ends_with(change)) {
             return log;
         }
@@ -150,40 +150,40 @@ fn logged(machine: &mut Vm, change: &str, press: impl Fn(&mut Vm)) -> Vec<String
     panic!("600 presses, and no change in the log ends in '{change}'");
 }
 
-/// Steers with keys and with commands. The log must then reproduce the frame on the screen, held, and on the
-/// emulated VGA too.
+/// Steers with keys and with commands. The log must then reproduce the frame on the screen, both on the held
+/// machine and on the emulated VGA.
 #[test]
 fn the_log_reproduces_the_frame_of_a_steered_demo() {
-    let mut machine = boot();
-    machine.wait_until_running().unwrap();
-    // Keys held down, since QEMU's window sends repeats; more codes than the machine has room for.
+    let mut vm = boot();
+    vm.wait_until_running().unwrap();
+    // Keys held down: QEMU's window sends repeats. These are more key codes than the machine can buffer.
     for _ in 0..100 {
-        machine.key("left", true).unwrap();
-        machine.key("m", true).unwrap();
+        vm.key("left", true).unwrap();
+        vm.key("m", true).unwrap();
     }
     for key in ["left", "m", "d", "kp_add", "pgup"] {
-        machine.key(key, true).unwrap();
-        machine.key(key, false).unwrap();
+        vm.key(key, true).unwrap();
+        vm.key(key, false).unwrap();
     }
     // The scene must not change between two of these keys.
-    logged(&mut machine, " nearer", |machine| {
-        machine.key("pgup", true).unwrap();
-        machine.key("pgup", false).unwrap();
+    logged(&mut vm, " nearer", |vm| {
+        vm.key("pgup", true).unwrap();
+        vm.key("pgup", false).unwrap();
     });
     let steer = |name: &str| Command::Steer(None, Change::Act(name.parse::<Action>().unwrap()));
     for name in ["next-scene", "pitch-up", "coarser"] {
-        machine.send(steer(name)).unwrap();
-        machine.rest(Duration::from_millis(100)).unwrap();
+        vm.send(steer(name)).unwrap();
+        vm.rest(Duration::from_millis(100)).unwrap();
     }
     // Without a release a second press is a repeat, which does not end the pause.
-    let log = logged(&mut machine, " pause", |machine| {
-        machine.key("spc", true).unwrap();
+    let log = logged(&mut vm, " pause", |vm| {
+        vm.key("spc", true).unwrap();
     });
     println!("{log:#?}");
     let pushed = |name| log.iter().filter(|line| line.ends_with(name)).count();
     assert_eq!((pushed(" next-mapper"), pushed(" next-scene")), (1, 1));
-    // At most as many as the scene accepts. The next scene counts from zero, and on a busy machine some of
-    // the codes arrive after the change of scene.
+    // The scene accepts at most 32 steps. The next scene counts from zero, and on a busy machine some of the
+    // codes arrive after the change of scene.
     let first = log.iter().take_while(|line| !line.ends_with(" next-scene"));
     let first = first.filter(|line| line.ends_with(" yaw-left")).count();
     assert!((1..=32).contains(&first), "{log:?}");
@@ -197,30 +197,30 @@ fn the_log_reproduces_the_frame_of_a_steered_demo() {
         .parse()
         .unwrap();
     // The frame of that tick is on the screen.
-    machine.rest(Duration::from_millis(100)).unwrap();
-    let shown = machine.dump(Content::Page).unwrap();
-    let screen = machine.screen().unwrap();
+    vm.rest(Duration::from_millis(100)).unwrap();
+    let shown = vm.dump(Content::Page).unwrap();
+    let screen = vm.screen().unwrap();
     assert!(shown.header.frame.unwrap().to_string().starts_with("pose "));
 
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
-    let cards: [&mut dyn Backend; 2] = [&mut machine, &mut emulated];
-    for card in cards {
-        card.send(Command::Hold).unwrap();
+    let both: [&mut dyn Backend; 2] = [&mut vm, &mut emulated];
+    for backend in both {
+        backend.send(Command::Hold).unwrap();
         for line in &log {
-            card.send(Command::parse(line).unwrap()).unwrap();
+            backend.send(Command::parse(line).unwrap()).unwrap();
         }
-        card.send(Command::ShowAt(paused)).unwrap();
-        let again = card.dump(Content::Page).unwrap();
+        backend.send(Command::ShowAt(paused)).unwrap();
+        let again = backend.dump(Content::Page).unwrap();
         assert_eq!(
             (again.header.scene, again.header.mapper),
             (shown.header.scene.clone(), shown.header.mapper)
         );
         assert_eq!(again.header.frame, shown.header.frame);
         assert!(again.pixels == shown.pixels && again.palette == shown.palette);
-        assert!(card.screen().unwrap() == screen);
+        assert!(backend.screen().unwrap() == screen);
     }
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
 /// Makes the kernel fail, and returns the failure.
@@ -229,8 +229,8 @@ fn failure_by(fault: FailKind) -> ExpectedFailure {
 }
 
 fn failure_within(limits: Limits, fault: FailKind) -> ExpectedFailure {
-    let mut machine = boot_with(&[], limits);
-    let failure = ExpectedFailure::of(machine.send(Command::Fail(fault)));
+    let mut vm = boot_with(&[], limits);
+    let failure = ExpectedFailure::of(vm.send(Command::Fail(fault)));
     let evidence = failure.evidence.as_deref().expect("evidence is kept");
     for name in ["command.txt", "serial.log", "screen.png"] {
         let exists = evidence.join(name).exists();
@@ -252,7 +252,7 @@ fn a_panic_is_reported_with_its_source_line() {
     assert_eq!(report[1], "'fail panic' requested this panic");
 }
 
-/// The line is locked and half written; the report must pass both.
+/// Panics while a line is locked and half written. The report must get past both.
 #[test]
 fn a_panic_in_the_middle_of_a_line_is_reported_completely() {
     let failure = failure_by(FailKind::PanicInLine);
@@ -262,12 +262,12 @@ fn a_panic_in_the_middle_of_a_line_is_reported_completely() {
     assert_eq!(report[1], "'fail panic-in-line' requested this panic");
 }
 
-/// The kernel ends while commands are pending: its last message must still be read.
+/// Ends the kernel while commands are pending. Its last message must still be read.
 #[test]
 fn a_panic_with_pending_commands_is_reported_completely() {
-    let mut machine = boot();
-    machine.send_raw(b"fail panic\ncounts\ncounts\n").unwrap();
-    let failure = ExpectedFailure::of(machine.wait_for_end());
+    let mut vm = boot();
+    vm.send_raw(b"fail panic\ncounts\ncounts\n").unwrap();
+    let failure = ExpectedFailure::of(vm.wait_for_end());
     let Verdict::Panic { report } = &failure.verdict else {
         panic!("{}", failure);
     };
@@ -286,8 +286,8 @@ fn a_panic_with_pending_commands_is_reported_completely() {
 fn a_reboot_loop_is_detected() {
     let mut config = config();
     config.arguments = vec!["-action".into(), "reboot=reset".into()];
-    let mut machine = Vm::boot(&config).unwrap();
-    let failure = ExpectedFailure::of(machine.send(Command::Fail(FailKind::TripleFault)));
+    let mut vm = Vm::boot(&config).unwrap();
+    let failure = ExpectedFailure::of(vm.send(Command::Fail(FailKind::TripleFault)));
     assert_eq!(failure.verdict, Verdict::TripleFault { booted: true });
 }
 
@@ -347,34 +347,35 @@ fn a_machine_that_hangs_is_ended_by_the_watchdog() {
     assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
 
-/// The data fills the buffers, and then nobody reads them.
+/// Sends data that fills the buffers, which the kernel no longer reads.
 #[test]
 fn a_kernel_that_does_not_read_is_ended_by_the_watchdog() {
-    let mut machine = boot_with(&[], short_limits());
-    machine.send_raw(b"fail hang\n").unwrap();
-    let failure = ExpectedFailure::of(machine.send_raw(&vec![b' '; 4 << 20]));
+    let mut vm = boot_with(&[], short_limits());
+    vm.send_raw(b"fail hang\n").unwrap();
+    let failure = ExpectedFailure::of(vm.send_raw(&vec![b' '; 4 << 20]));
     let waited_for = "room in the kernel's serial buffer".into();
     assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
 
-/// A machine, and QEMU's monitor, through which the test acts as a user at the window.
+/// Returns a VM, and QEMU's monitor, through which the test acts as a user at the window.
 fn boot_with_monitor(limits: Limits) -> (Vm, UnixStream) {
     let folder = tempfile::tempdir().unwrap();
     let socket = folder.path().join("monitor");
     let monitor = format!("unix:{},server=on,wait=off", socket.display());
-    let machine = boot_with(&["-monitor", &monitor], limits);
-    (machine, UnixStream::connect(&socket).unwrap())
+    let vm = boot_with(&["-monitor", &monitor], limits);
+    (vm, UnixStream::connect(&socket).unwrap())
 }
 
-/// Closing GTK's window quits QEMU, and its menu has the other two. `-no-reboot -no-shutdown` turns a reset
-/// into a machine that stands still, and the kernel does not notice a power button.
+/// Does what a user can do at GTK's window: close it, which quits QEMU, or choose reset or power-down in its
+/// menu. With `-no-reboot -no-shutdown` a reset stops the machine, and the kernel does not notice a power
+/// button.
 #[test]
 fn a_machine_that_is_ended_at_the_window_is_ended_by_the_user() {
     for command in ["quit\n", "system_reset\n", "system_powerdown\n"] {
-        let (machine, mut monitor) = boot_with_monitor(Limits::default());
+        let (vm, mut monitor) = boot_with_monitor(Limits::default());
         monitor.write_all(command.as_bytes()).unwrap();
         assert_eq!(
-            ExpectedFailure::of(machine.watch()).verdict,
+            ExpectedFailure::of(vm.watch()).verdict,
             Verdict::User,
             "{command}"
         );
@@ -383,33 +384,33 @@ fn a_machine_that_is_ended_at_the_window_is_ended_by_the_user() {
 
 #[test]
 fn a_paused_machine_does_not_count_as_a_hang() {
-    let (mut machine, mut monitor) = boot_with_monitor(short_limits());
+    let (mut vm, mut monitor) = boot_with_monitor(short_limits());
     monitor.write_all(b"stop\n").unwrap();
-    machine.rest(Duration::from_secs(1)).unwrap();
+    vm.rest(Duration::from_secs(1)).unwrap();
     // Longer than the limit for an answer.
     let resume = std::thread::spawn(move || {
         std::thread::sleep(Duration::from_secs(4));
         monitor.write_all(b"cont\n").unwrap();
         monitor
     });
-    machine.send(Command::Hold).unwrap();
+    vm.send(Command::Hold).unwrap();
     assert!(
         resume.is_finished(),
-        "the answer came while the machine stood still"
+        "the answer came while the machine was paused"
     );
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
 #[test]
 fn a_pause_has_a_time_limit() {
     let pause = Duration::from_secs(2);
-    let (mut machine, mut monitor) = boot_with_monitor(Limits {
+    let (mut vm, mut monitor) = boot_with_monitor(Limits {
         pause,
         ..short_limits()
     });
     monitor.write_all(b"stop\n").unwrap();
-    machine.rest(Duration::from_secs(1)).unwrap();
-    let failure = ExpectedFailure::of(machine.send(Command::Hold));
+    vm.rest(Duration::from_secs(1)).unwrap();
+    let failure = ExpectedFailure::of(vm.send(Command::Hold));
     let waited_for = "the answer to 'hold'".into();
     assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
@@ -471,8 +472,8 @@ fn the_users_arguments_for_qemu_are_accepted() {
     std::fs::write(&disk, vec![0; 1 << 20]).unwrap();
     // A second disk must not boot first, and two accelerators would be an error.
     let arguments = ["-M", "q35,accel=tcg", "-hda", disk.to_str().unwrap()];
-    let machine = boot_with(&arguments, Limits::default());
-    machine.leave().unwrap();
+    let vm = boot_with(&arguments, Limits::default());
+    vm.leave().unwrap();
 }
 
 #[test]
@@ -518,13 +519,9 @@ fn a_failure_of_qemu_is_reported_with_its_output() {
 
 #[test]
 fn a_killed_qemu_is_a_failure_of_qemu() {
-    let mut machine = boot();
-    send_signal(Signal::KILL, machine.process());
-    let failure = ExpectedFailure::of(
-        machine
-            .wait_until_running()
-            .and_then(|()| machine.wait_for_end()),
-    );
+    let mut vm = boot();
+    send_signal(Signal::KILL, vm.process());
+    let failure = ExpectedFailure::of(vm.wait_until_running().and_then(|()| vm.wait_for_end()));
     let Verdict::Qemu { status, .. } = &failure.verdict else {
         panic!("{failure}");
     };
@@ -533,9 +530,9 @@ fn a_killed_qemu_is_a_failure_of_qemu() {
 
 #[test]
 fn a_qemu_that_a_signal_ends_is_ended_by_the_user() {
-    let machine = boot();
-    send_signal(Signal::TERM, machine.process());
-    let failure = ExpectedFailure::of(machine.watch());
+    let vm = boot();
+    send_signal(Signal::TERM, vm.process());
+    let failure = ExpectedFailure::of(vm.watch());
     assert_eq!(failure.verdict, Verdict::User);
 }
 
@@ -566,14 +563,14 @@ fn two_runs_at_once_without_a_display_each_leave_a_frame() {
     let [ball, cube] = both.map(|output| {
         let stderr = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{stderr}");
-        assert!(stderr.contains("no display:"), "{stderr}");
+        assert!(stderr.contains("no display: neither DISPLAY"), "{stderr}");
         String::from_utf8(output.stdout).unwrap()
     });
     assert!(
         cube.ends_with("frame-cube-within-1_4.png\n"),
         "{ball}{cube}"
     );
-    for (frame, look) in [
+    for (frame, commands) in [
         (ball, &[][..]),
         (cube, &["scene cube", "mapper within-1/4"][..]),
     ] {
@@ -589,7 +586,7 @@ fn two_runs_at_once_without_a_display_each_leave_a_frame() {
         let mut memory = backend::memory();
         let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
         emulated.send(Command::Hold).unwrap();
-        for command in look {
+        for command in commands {
             emulated.send(Command::parse(command).unwrap()).unwrap();
         }
         let mut is_of = |frame| {
@@ -600,7 +597,7 @@ fn two_runs_at_once_without_a_display_each_leave_a_frame() {
         };
         assert!(
             (0..3600).any(&mut is_of),
-            "no frame of the demo equals the PNG: {look:?}"
+            "no frame of the demo equals the PNG: {commands:?}"
         );
     }
 }
@@ -642,7 +639,7 @@ fn qemu_ends_with_the_program_by_any_signal() {
     ] {
         let folder = tempfile::tempdir().unwrap();
         let pidfile = folder.path().join("pid");
-        // The path is longer than a socket's path may be.
+        // The path is longer than the limit for a socket's path.
         let temporary = folder.path().join("t".repeat(120));
         std::fs::create_dir(&temporary).unwrap();
         let mut program = Process::new(env!("CARGO_BIN_EXE_crystal-ball"));
@@ -666,11 +663,11 @@ fn qemu_ends_with_the_program_by_any_signal() {
     }
 }
 
-/// Calls `ask` until it returns an answer, for at most a minute.
-fn wait_for<T>(what: &str, mut ask: impl FnMut() -> Option<T>) -> T {
+/// Calls `poll` until it returns a value, for at most a minute.
+fn wait_for<T>(what: &str, mut poll: impl FnMut() -> Option<T>) -> T {
     let by = Instant::now() + Duration::from_secs(60);
     loop {
-        if let Some(answer) = ask() {
+        if let Some(answer) = poll() {
             return answer;
         }
         assert!(Instant::now() < by, "{what} did not come");

@@ -1,5 +1,5 @@
-//! Whole frames against the oracle: draws every golden again from the snapped polygons by the definitions,
-//! pixel by pixel, with background, light and palette indices.
+//! Compares whole frames with the oracle: draws every golden again, pixel by pixel, by the definitions, from
+//! the snapped polygons, with background, light and palette indices.
 
 use std::fmt;
 
@@ -19,13 +19,13 @@ use texmap::{Face, Loop, Mapper, Point, Texture};
 /// is squeezed into a sliver, and 240 steps, each rounded by less than 2^-16.
 const AFFINE_BITS: u32 = 7;
 
-/// A golden's scene.
+/// Returns a golden's scene.
 fn scene(golden: &Golden) -> &'static Entry<'static> {
     let scene = golden.options.scene.and_then(Entry::parse);
     scene.unwrap_or(&CATALOGUE[0])
 }
 
-/// The pose of a golden's last frame.
+/// Returns the pose of a golden's last frame.
 fn pose(golden: &Golden) -> Pose {
     let frame = golden.show.last().expect("a golden shows something");
     demo::pose(scene(golden), *frame).expect("a golden's pose is legal")
@@ -44,7 +44,7 @@ impl fmt::Debug for ExpectedFrame {
     }
 }
 
-/// The colours of `texture` that the definition allows for the face `drawn` at the centre of (x, y).
+/// Returns the colours of `texture` that the definition allows for the face `drawn` at the centre of (x, y).
 fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i32) -> Vec<u8> {
     let (width, height) = (texture.width(), texture.height());
     let (columns, rows) = match mapper {
@@ -78,8 +78,8 @@ fn colours(drawn: &Face<'_>, texture: &Texture<'_>, mapper: Mapper, x: i32, y: i
         .collect()
 }
 
-fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> ExpectedFrame {
-    let (background, convex) = (stage.background(), stage.is_convex());
+fn expected(renderer: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> ExpectedFrame {
+    let (background, convex) = (renderer.background(), renderer.is_convex());
     let mut expected = ExpectedFrame {
         colours: (0..WIDTH * HEIGHT)
             .map(|i| vec![background[i / WIDTH]])
@@ -87,13 +87,13 @@ fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expec
         covered: vec![0; WIDTH * HEIGHT],
     };
     let mut seen = Vec::new();
-    let nearest = depth::nearest(stage, pose);
-    stage.at(pose).faces(|number, drawn| {
+    let nearest = depth::nearest(renderer, pose);
+    renderer.at(pose).faces(|number, drawn| {
         let drawn = drawn.expect("no legal face is dropped");
         seen.push((number, drawn.polygon.to_vec(), drawn.texture, drawn.anchors));
     });
     for (number, polygon, surface, anchors) in seen {
-        let texture = stage.surface(surface);
+        let texture = renderer.surface(surface);
         let drawn = Face {
             polygon: &polygon,
             texture: surface,
@@ -123,7 +123,7 @@ fn expected(stage: &mut SceneRenderer<'_>, pose: &Pose, mapper: Mapper) -> Expec
     expected
 }
 
-/// Compares a frame's pixels with the expected ones.
+/// Compares a frame's pixels with the expected pixels.
 fn compare(name: &str, expected: &ExpectedFrame, pixel: impl Fn(usize) -> u8) {
     for (i, (allowed, covered)) in expected.colours.iter().zip(&expected.covered).enumerate() {
         let (x, y) = (i % WIDTH, i / WIDTH);
@@ -162,21 +162,21 @@ fn compare_coverage(
 fn the_oracle_draws_every_golden() {
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = CATALOGUE[0].paint(&mut texels);
-    let mut storage = in_place::boxed!(RenderMemory);
-    let mut stage = SceneRenderer::new(&mut storage, CATALOGUE[0].scene(&textures));
+    let mut memory = in_place::boxed!(RenderMemory);
+    let mut renderer = SceneRenderer::new(&mut memory, CATALOGUE[0].scene(&textures));
     let mut between = 0;
     for golden in golden::find(&golden_folder()).unwrap() {
         let entry = scene(&golden);
         let mut texels = Box::new([0; MAX_TEXELS]);
-        stage.set(entry.scene(&entry.paint(&mut texels)));
+        renderer.set(entry.scene(&entry.paint(&mut texels)));
         let pose = pose(&golden);
         // The committed PNG.
-        let frame = golden.frame().unwrap().expect("it was blessed");
-        let affine = expected(&mut stage, &pose, Mapper::default());
+        let frame = golden.frame().unwrap().expect("the golden was blessed");
+        let affine = expected(&mut renderer, &pose, Mapper::default());
         let mapper = golden.options.mapper.unwrap_or_default();
-        let background = stage.background();
+        let background = renderer.background();
         match mapper {
-            // This loop's fractions are shorter.
+            // The loop of this mapper has shorter fractions.
             Mapper::Affine(Loop::Packed) => {
                 compare_coverage(&golden.name, &affine, background, |i| frame.pixels[i]);
             }
@@ -189,14 +189,14 @@ fn the_oracle_draws_every_golden() {
             .filter(|allowed| allowed.len() > 1)
             .count();
         // The same frame by the exact mapper, for which only one texel is right.
-        let exact = expected(&mut stage, &pose, Mapper::Exact);
+        let exact = expected(&mut renderer, &pose, Mapper::Exact);
         let mut page = Box::new(PlanarBuffer::new());
         page.clear(background);
         let options = RenderOptions {
             mapper: Mapper::Exact,
             ..RenderOptions::default()
         };
-        let stats = stage.draw(&pose, options, &mut *page).stats;
+        let stats = renderer.draw(&pose, options, &mut *page).stats;
         assert_eq!(stats.dropped, 0, "{}", golden.name);
         let name = format!("{} by the exact mapper", golden.name);
         compare(&name, &exact, |i| page.pixel(i % WIDTH, i / WIDTH));
@@ -204,9 +204,9 @@ fn the_oracle_draws_every_golden() {
     println!("{between} pixels so near to a texel's border that affine columns may read either");
 }
 
-/// The second oracle does not know about snapping: a ray meets a face if it passes each of its edges on the
-/// same side, which is the sign of an exact determinant in view space, and meets it beyond the near plane. No
-/// pixel further than 1/128 pixel from a true edge may change sides.
+/// Compares with the second oracle, which does not snap: a ray meets a face if it passes each of its edges on
+/// the same side, which is the sign of an exact determinant in view space, and meets it beyond the near
+/// plane. No pixel further than 1/128 pixel from a true edge may change sides.
 #[test]
 fn snapping_changes_no_pixel_further_than_a_128th_from_a_true_edge() {
     let mut random = seeded::generator();

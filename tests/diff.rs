@@ -68,7 +68,7 @@ fn check(exit: Exit, code: i32, out: &str, errors: &str) {
     assert_eq!(exit, expected);
 }
 
-/// A page's dump as a file, after `change`.
+/// Returns a page's dump as a file, after `change`.
 fn page(change: impl FnOnce(&mut Dump)) -> Vec<u8> {
     file(Content::Page, change)
 }
@@ -80,7 +80,7 @@ fn file(content: Content, change: impl FnOnce(&mut Dump)) -> Vec<u8> {
     bytes
 }
 
-/// A PNG as a file, after `change`.
+/// Returns a PNG as a file, after `change`.
 fn png(change: impl FnOnce(&mut IndexedImage)) -> Vec<u8> {
     let (mut frame, mut bytes) = (Dump::example(Content::Page).frame(), Vec::new());
     change(&mut frame);
@@ -456,7 +456,7 @@ fn a_report_of_equal_files_says_so_and_has_no_folder() {
     assert_eq!(exit.code, Some(0), "{exit:?}");
     assert!(world.read("r.html").contains("<h1>Nothing differs</h1>"));
     assert!(!world.path("r-files").exists());
-    // A report about files that could not be compared does not claim that nothing differs.
+    // If files could not be compared, the report does not claim that nothing differs.
     let exit = world.diff(&["a.png", "gone", "--report", "r.html"]);
     assert_eq!(exit.code, Some(2), "{exit:?}");
     let html = world.read("r.html");

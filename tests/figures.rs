@@ -13,7 +13,7 @@ use crate::ready;
 
 /// How long the running demo is observed.
 const WATCHED: Duration = Duration::from_secs(60);
-/// Boots; their times' median is reported.
+/// The number of boots. The reported time is their median.
 const BOOTS: usize = 5;
 
 #[test]
@@ -24,7 +24,7 @@ fn figures() {
     let config = Config::new(&ready);
     let goldens = golden::find(&golden_folder()).expect("golden frames");
     let mut memory = backend::memory();
-    let mut emulated = EmulatedDemo::new(&mut memory).expect("an emulated card");
+    let mut emulated = EmulatedDemo::new(&mut memory).expect("an emulated VGA");
     let (mut set_ups, mut kernels, mut frames) = (Vec::new(), Vec::new(), Vec::new());
     let mut verified = Vec::new();
     for _ in 0..BOOTS {
@@ -32,16 +32,16 @@ fn figures() {
         setup::ready(&options).expect("the set-up, warm");
         set_ups.push(start.elapsed());
         let start = Instant::now();
-        let mut machine = Vm::boot(&config).expect("boots");
+        let mut vm = Vm::boot(&config).expect("boots");
         kernels.push(start.elapsed());
-        machine.wait_until_running().expect("runs");
+        vm.wait_until_running().expect("runs");
         frames.push(start.elapsed());
-        machine.leave().expect("leaves");
+        vm.leave().expect("leaves");
         let start = Instant::now();
-        let mut machine = Vm::boot(&config).expect("boots");
-        verify(&goldens[..1], &mut emulated, &mut machine, Transfer::Bytes);
+        let mut vm = Vm::boot(&config).expect("boots");
+        verify(&goldens[..1], &mut emulated, &mut vm, Transfer::Bytes);
         verified.push(start.elapsed());
-        machine.leave().expect("leaves");
+        vm.leave().expect("leaves");
     }
     println!("set-up, warm:                  {}", spread(set_ups));
     println!("QEMU's start to the kernel:    {}", spread(kernels));
@@ -51,13 +51,13 @@ fn figures() {
         spread(verified)
     );
 
-    let mut machine = Vm::boot(&config).expect("boots");
+    let mut vm = Vm::boot(&config).expect("boots");
     for (transfer, how) in [
         (Transfer::Checksums, "by checksum"),
         (Transfer::Bytes, "by every byte"),
     ] {
         let mut times: Vec<_> = (0..BOOTS)
-            .map(|_| verify(&goldens, &mut emulated, &mut machine, transfer))
+            .map(|_| verify(&goldens, &mut emulated, &mut vm, transfer))
             .collect();
         times.sort();
         let rate = |time: Duration| goldens.len() as f64 / time.as_secs_f64();
@@ -73,19 +73,19 @@ fn figures() {
         Command::Dump(Content::Page),
         Command::Dump(Content::Memory),
     ] {
-        let lines = machine.send(command).expect("answers");
+        let lines = vm.send(command).expect("answers");
         // Checksum and LF, and the closing line.
         let line = |line: &String| line.len() + 11;
         let bytes: usize = lines.iter().map(line).sum();
         let closing = line(&format!("ok {command}"));
         println!("serial bytes of '{command}': {}", bytes + closing);
     }
-    machine.leave().expect("leaves");
+    vm.leave().expect("leaves");
 
-    let mut machine = Vm::boot(&config).expect("boots");
-    machine.wait_until_running().expect("runs");
-    machine.rest(WATCHED).expect("runs on");
-    let counts = machine.send(Command::Counts).expect("answers");
+    let mut vm = Vm::boot(&config).expect("boots");
+    vm.wait_until_running().expect("runs");
+    vm.rest(WATCHED).expect("runs on");
+    let counts = vm.send(Command::Counts).expect("answers");
     let pace = counts
         .iter()
         .find(|line| line.starts_with("pace "))
@@ -99,28 +99,26 @@ fn figures() {
     );
     println!("writes for a frame:");
     for frame in [0, 240, 480] {
-        machine
-            .send(Command::Show(FrameName::Number(frame)))
+        vm.send(Command::Show(FrameName::Number(frame)))
             .expect("shows");
         // The first frame of each page paints all of the background; the third round is typical.
         for _ in 0..5 {
-            machine
-                .send(Command::Show(FrameName::Number(frame)))
+            vm.send(Command::Show(FrameName::Number(frame)))
                 .expect("shows");
         }
         println!("frame {frame}");
-        for line in machine.send(Command::Counts).expect("answers") {
+        for line in vm.send(Command::Counts).expect("answers") {
             println!("  {line}");
         }
     }
-    machine.leave().expect("leaves");
+    vm.leave().expect("leaves");
 }
 
-/// Verifies goldens, and returns the time that it needed.
+/// Verifies goldens, and returns the elapsed time.
 fn verify(
     goldens: &[Golden],
     emulated: &mut EmulatedDemo<'_>,
-    machine: &mut Vm,
+    vm: &mut Vm,
     transfer: Transfer,
 ) -> Duration {
     let start = Instant::now();
@@ -128,14 +126,14 @@ fn verify(
     for golden in goldens {
         findings.check_golden(golden, emulated).expect("checks");
         findings
-            .check_cards(golden, emulated, machine, transfer)
+            .check_vgas(golden, emulated, vm, transfer)
             .expect("checks");
     }
     assert!(findings.found().is_empty(), "{:?}", findings.found());
     start.elapsed()
 }
 
-/// Median, least and most.
+/// Returns the median, the least and the greatest time as text.
 fn spread(mut times: Vec<Duration>) -> String {
     times.sort();
     let seconds = |i: usize| times[i].as_secs_f64();

@@ -1,11 +1,11 @@
 //! Damaged files: every model of a user and every ramdisk of an image is either drawn or refused with a
 //! message, and no file causes a panic.
 //!
-//! Good files are changed at random, so that they pass the first checks and reach the later ones. The
+//! Valid files are changed at random, so that they pass the first checks and reach the later ones. The
 //! checksums of a model file and of a PNG's chunks are recomputed, because a wrong checksum ends the checks.
 //! Every accepted file is drawn. A refusal's message is short and contains no terminal control sequence.
 //! `cargo test` does this for about a second. `cargo fuzz-models` does it for two minutes, or
-//! `CRYSTAL_BALL_FUZZ_MINUTES`, from the seed `CRYSTAL_BALL_FUZZ_SEED`, or a fresh one.
+//! `CRYSTAL_BALL_FUZZ_MINUTES`, from the seed `CRYSTAL_BALL_FUZZ_SEED`, or from a fresh seed.
 
 use std::f64::consts::{PI, TAU};
 use std::io::Cursor;
@@ -40,7 +40,7 @@ impl Drop for SeedReport {
 /// Memory for drawing, kept from case to case.
 struct DrawMemory {
     arena: InPlace<Arena>,
-    storage: InPlace<RenderMemory>,
+    render_memory: InPlace<RenderMemory>,
     painted: Box<[u8; MAX_TEXELS]>,
     page: Box<PlanarBuffer>,
 }
@@ -49,7 +49,7 @@ impl DrawMemory {
     fn new() -> Self {
         Self {
             arena: in_place::boxed!(Arena),
-            storage: in_place::boxed!(RenderMemory),
+            render_memory: in_place::boxed!(RenderMemory),
             painted: Box::new([0; MAX_TEXELS]),
             page: Box::new(PlanarBuffer::new()),
         }
@@ -59,7 +59,7 @@ impl DrawMemory {
     fn draw(&mut self, model_file: &ModelFile<'_>, random: &mut Rng) {
         let entry = model_file.entry(&mut self.arena);
         let textures = entry.paint(&mut self.painted);
-        let mut stage = SceneRenderer::new(&mut self.storage, entry.scene(&textures));
+        let mut renderer = SceneRenderer::new(&mut self.render_memory, entry.scene(&textures));
         let options = RenderOptions {
             mapper: Mapper::ALL[random.usize(..Mapper::ALL.len())].1,
             ..RenderOptions::default()
@@ -73,11 +73,11 @@ impl DrawMemory {
         if random.u8(..8) == 0 {
             pose.distance = *random.choice(&[0, 1, Pose::MAX_DISTANCE]).unwrap();
         }
-        stage.draw(&pose, options, &mut *self.page);
+        renderer.draw(&pose, options, &mut *self.page);
     }
 }
 
-/// Valid OBJs, each with a different feature.
+/// Returns valid OBJs, each with a different feature.
 fn objs() -> Vec<Vec<u8>> {
     let mut ball = String::from("o ball\n");
     let (rings, segments) = (7, 9);
@@ -142,8 +142,8 @@ fn model_file(text: &[u8], image: (u32, u32)) -> anyhow::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Runs cases of a kind, each from its own seed, until `more` returns false. Returns how many cases ran, and
-/// how many were accepted.
+/// Runs cases of a kind, each with a different seed, until `more` returns false. Returns how many cases ran,
+/// and how many were accepted.
 fn run(
     first: u64,
     mut more: impl FnMut(u64) -> bool,
@@ -158,7 +158,7 @@ fn run(
     (cases, accepted)
 }
 
-/// Numbers at the borders of ranges, in a model file's format.
+/// Returns numbers at the borders of ranges, in a model file's format.
 fn number(random: &mut Rng) -> i32 {
     let borders = [
         0,
@@ -192,7 +192,7 @@ fn model_file_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) 
     let before = random.choice(good).unwrap();
     let mut bytes = before.clone();
     for _ in 0..random.usize(1..6) {
-        // Most of a model file is its light table, in which any byte is valid.
+        // Most bytes of a model file are its light table, where any byte is valid.
         let at = match random.u8(..4) {
             0 => random.usize(..COUNTS + 10),
             1 => random.usize(..bytes.len()),
@@ -332,8 +332,7 @@ fn obj_case(good: &[Vec<u8>], memory: &mut DrawMemory, random: &mut Rng) -> bool
     match model_file(&text, image) {
         Ok(bytes) => {
             assert!(bytes.len() <= MAX_BYTES);
-            let model_file =
-                ModelFile::parse(&bytes).expect("what is made of an OBJ is a good model file");
+            let model_file = ModelFile::parse(&bytes).expect("an OBJ makes a valid model file");
             memory.draw(&model_file, random);
             true
         }
@@ -377,7 +376,7 @@ fn rewritten(text: Vec<u8>, random: &mut Rng) -> Vec<u8> {
     written
 }
 
-/// A PNG's chunks, each with its kind.
+/// Returns a PNG's chunks, each with its kind.
 fn chunks(png: &[u8]) -> Vec<(Vec<u8>, Vec<u8>)> {
     let mut rest = &png[8..];
     let mut chunks = Vec::new();
@@ -448,7 +447,8 @@ fn png_case(good: &[Vec<u8>], random: &mut Rng) -> bool {
     is_read(&bytes)
 }
 
-/// Whether bytes can be read as a texture. Also reads them as `diff` does, which must not panic either.
+/// Returns whether bytes can be read as a texture. Also reads them as `diff` does, which must not panic
+/// either.
 fn is_read(bytes: &[u8]) -> bool {
     // The program also checks the size in the header first.
     let header = png::Decoder::new(Cursor::new(bytes))
@@ -470,7 +470,7 @@ fn is_read(bytes: &[u8]) -> bool {
     }
 }
 
-/// PNGs with a few colours, of all kinds.
+/// Returns PNGs with a few colours, of all kinds.
 fn pngs() -> Vec<Vec<u8>> {
     use png::BitDepth::{Eight, Four, One, Sixteen};
     use png::ColorType::{Grayscale, GrayscaleAlpha, Indexed, Rgb, Rgba};
@@ -529,8 +529,8 @@ fn all(seed: u64, mut more: impl FnMut(&str, u64) -> bool) {
             begun.elapsed().as_secs_f64()
         );
         // If fewer cases were accepted, nothing behind the first checks was reached; if all were, nothing was
-        // wrong. In practice at least a twentieth of each kind is accepted; the limit is a hundredth, since
-        // the cases of a short run may be of one sort.
+        // wrong. In practice at least a twentieth of each kind is accepted; the limit is a hundredth, because
+        // the cases of a short run may all be similar.
         let some = accepted * 100 > cases && accepted < cases;
         assert!(some || cases < 1000, "{kind}");
     };

@@ -1,9 +1,9 @@
 //! Why edges are integers: reproduces and counts the gaps of the Black Book's figure 57.1.
 //!
-//! The figure is a turned sheet of quadrilaterals. Its fields alternate between two methods of finding edges:
-//! integers from whole-pixel vertices, and 16.16 fixed point from the exact vertices. Each method alone would
-//! leave no gap; where the two meet, pixels are left out and others are written twice. Beside it is the same
-//! sheet as this project draws it, every field by one exact rule.
+//! The figure is a turned sheet of quadrilaterals. Its quadrilaterals alternate between two methods of
+//! finding edges: integers from whole-pixel vertices, and 16.16 fixed point from the exact vertices. Each
+//! method alone would leave no gap; where the two meet, pixels are left out and others are written twice. The
+//! image also shows the same sheet as this project draws it, with one exact rule for every quadrilateral.
 //!
 //! `cargo gaps` writes `docs/gaps.png`.
 
@@ -15,12 +15,12 @@ use modex::{Destination, HEIGHT, Lane, PlanarBuffer, STRIDE, WIDTH};
 use texmap::plane::Anchor;
 use texmap::{Face, JobList, Mapper, Order, Renderer, Texture, Vertex};
 
-/// Fields of the sheet across and down.
+/// Quadrilaterals of the sheet across and down.
 const FIELDS: (i32, i32) = (9, 7);
 /// Pixels from one corner of the sheet to the next.
 const SIDE: f64 = 23.7;
 
-/// How often each pixel was written, and the kind of field that wrote it last.
+/// How often each pixel was written, and the kind of quadrilateral that wrote it last.
 struct WriteCounts {
     times: Vec<u8>,
     kind: Vec<u8>,
@@ -39,8 +39,8 @@ impl WriteCounts {
         self.kind[y * WIDTH + x] = kind;
     }
 
-    /// Counts the pixels of the sheet that no field wrote, and those that two fields wrote. A pixel belongs
-    /// to the sheet if its neighbours on two opposite sides are written.
+    /// Counts the pixels of the sheet that no quadrilateral wrote, and the pixels that two wrote. A pixel
+    /// belongs to the sheet if its neighbours on two opposite sides are written.
     fn faults(&self) -> (usize, usize) {
         let written = |i: usize| self.times[i] > 0;
         let gap = |&i: &usize| {
@@ -52,7 +52,7 @@ impl WriteCounts {
     }
 }
 
-/// A corner of the sheet on the screen.
+/// Returns a corner of the sheet on the screen.
 fn corner(i: i32, j: i32) -> (f64, f64) {
     let (sin, cos) = 0.23f64.sin_cos();
     let (x, y) = (
@@ -62,7 +62,7 @@ fn corner(i: i32, j: i32) -> (f64, f64) {
     (160.0 + x * cos - y * sin, 120.0 + x * sin + y * cos)
 }
 
-/// Each field's four corners and its kind.
+/// Returns each quadrilateral's four corners and its kind.
 fn sheet() -> impl Iterator<Item = ([(f64, f64); 4], u8)> {
     (0..FIELDS.1).flat_map(|j| {
         (0..FIELDS.0).map(move |i| {
@@ -104,7 +104,7 @@ fn by_rows(corners: [(f64, f64); 4], mut scan: impl FnMut(i32, i32, i32)) {
     }
 }
 
-/// The sheet with the two methods of finding edges.
+/// Returns the sheet with the two methods of finding edges.
 fn mixed() -> WriteCounts {
     let mut page = WriteCounts::new();
     for (corners, kind) in sheet() {
@@ -123,9 +123,9 @@ fn mixed() -> WriteCounts {
 }
 
 /// Passes columns on to a page in RAM, and counts each pixel.
-struct Noted<'a>(&'a mut WriteCounts, u8, PlanarBuffer);
+struct CountedColumns<'a>(&'a mut WriteCounts, u8, PlanarBuffer);
 
-impl Destination for Noted<'_> {
+impl Destination for CountedColumns<'_> {
     fn select(&mut self, _: u16) {}
 
     fn lane<const STEP: usize>(
@@ -135,7 +135,7 @@ impl Destination for Noted<'_> {
         len: u16,
         draw: impl FnOnce(Lane<'_, STEP>),
     ) {
-        assert_eq!(STEP, STRIDE, "columns alone are drawn");
+        assert_eq!(STEP, STRIDE, "only columns are drawn");
         for y in y..y + len {
             self.0.write(x.into(), y.into(), self.1);
         }
@@ -143,7 +143,7 @@ impl Destination for Noted<'_> {
     }
 }
 
-/// The sheet as the renderer draws it.
+/// Returns the sheet as the renderer draws it.
 fn exact() -> WriteCounts {
     let mut page = WriteCounts::new();
     let textures = [Texture::DOT];
@@ -154,13 +154,13 @@ fn exact() -> WriteCounts {
             ..Vertex::default()
         });
         let mut jobs = JobList::<64>::new();
-        let mut noted = Noted(&mut page, kind, PlanarBuffer::new());
+        let mut noted = CountedColumns(&mut page, kind, PlanarBuffer::new());
         let (mapper, order) = (Mapper::default(), Order::default());
         let mut renderer = Renderer::new(&mut jobs, &textures, &mut noted, mapper, order);
         renderer.face(&Face {
             polygon: &polygon,
             texture: 0,
-            // Affine: no plane is needed.
+            // Affine mapping needs no plane.
             anchors: [Anchor::default(); 3],
             focal_length: 1,
         });
@@ -214,7 +214,7 @@ fn both_sheets_are_drawn_side_by_side() {
         let (gaps, doubles) = page.faults();
         println!("{name}: {gaps} pixels missing, {doubles} written twice");
     }
-    // Each pixel two by two, so that a missing pixel is visible.
+    // Each pixel is drawn two by two, so that a missing pixel is visible.
     let wide = pixels.chunks(2 * WIDTH).flat_map(|row| {
         let row: Vec<u8> = row.iter().flat_map(|&pixel| [pixel; 2]).collect();
         [row.clone(), row].concat()

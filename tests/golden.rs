@@ -1,4 +1,4 @@
-//! Golden frames, each with four witnesses: QEMU's card, the emulated VGA, the committed PNG, and QEMU's
+//! Golden frames, each with four witnesses: QEMU's VGA, the emulated VGA, the committed PNG, and QEMU's
 //! screen. `frames::golden` describes what is compared.
 //!
 //! Findings of all goldens are collected before the verdict, and a report shows them
@@ -26,7 +26,7 @@ pub fn goldens() -> Vec<Golden> {
     golden::find(&golden_folder()).expect("the golden frames")
 }
 
-/// The path of a test's report, which is written on failure.
+/// Returns the path of a test's report, which is written on failure.
 fn report(test: &str) -> PathBuf {
     let image = READY.image.with_file_name("golden");
     image.join(test).join("report.html")
@@ -54,8 +54,8 @@ fn the_emulated_vga_draws_every_golden() {
 }
 
 /// The goldens whose bytes are sent and compared one by one; for the others, checksums are compared. The list
-/// has a golden for each family of mappers, and among them every order of drawing and every kind of scene:
-/// mapper, order and scene determine a frame's bytes.
+/// has a golden for each family of mappers, each order of drawing and each kind of scene: mapper, order and
+/// scene determine a frame's bytes.
 const BYTE_BY_BYTE: [&str; 11] = [
     // Affine columns, on the ball.
     "frame-last",
@@ -85,7 +85,7 @@ const BYTE_BY_BYTE: [&str; 11] = [
 fn qemu_draws_and_shows_every_golden() {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
-    let mut machine = Vm::boot(&config()).unwrap();
+    let mut vm = Vm::boot(&config()).unwrap();
     let mut findings = Findings::default();
     for golden in goldens() {
         let transfer = if BYTE_BY_BYTE.contains(&golden.name.as_str()) {
@@ -94,14 +94,14 @@ fn qemu_draws_and_shows_every_golden() {
             Transfer::Checksums
         };
         findings
-            .check_cards(&golden, &mut emulated, &mut machine, transfer)
+            .check_vgas(&golden, &mut emulated, &mut vm, transfer)
             .unwrap();
     }
-    machine.leave().unwrap();
+    vm.leave().unwrap();
     conclude(findings, "qemu");
 }
 
-/// The kind of scene that a golden shows.
+/// Returns the kind of scene that a golden shows.
 fn kind_of_scene(golden: &Golden) -> &'static str {
     match golden.options.scene.unwrap_or("ball") {
         "ball" | "cube" => "convex solid",
@@ -130,14 +130,23 @@ fn goldens_that_are_sent_byte_by_byte_cover_every_kind() {
         let [a, b] = [a, b].map(|golden| golden.options.mapper.unwrap_or_default());
         discriminant(&a) == discriminant(&b)
     });
-    assert_eq!(of_mapper, [""; 0], "no golden with such a mapper is sent");
+    assert_eq!(
+        of_mapper, [""; 0],
+        "BYTE_BY_BYTE lacks a golden with this mapper"
+    );
     let of_order = covered(|a, b| {
         let [a, b] = [a, b].map(|golden| golden.options.order);
         a.unwrap_or_default() == b.unwrap_or_default()
     });
-    assert_eq!(of_order, [""; 0], "no golden with such an order is sent");
+    assert_eq!(
+        of_order, [""; 0],
+        "BYTE_BY_BYTE lacks a golden with this order"
+    );
     let of_kind = covered(|a, b| kind_of_scene(a) == kind_of_scene(b));
-    assert_eq!(of_kind, [""; 0], "no golden of such a scene is sent");
+    assert_eq!(
+        of_kind, [""; 0],
+        "BYTE_BY_BYTE lacks a golden of this kind of scene"
+    );
 }
 
 #[test]
@@ -156,7 +165,7 @@ fn every_mapper_and_every_order_has_a_golden() {
     }
 }
 
-/// A few goldens, for a quick check of a configuration.
+/// Returns a few goldens, for a quick check of a configuration.
 pub fn few() -> Vec<Golden> {
     let names = ["erased-turn", "nearest", "speck"];
     let mut few = goldens();
@@ -165,8 +174,8 @@ pub fn few() -> Vec<Golden> {
     few
 }
 
-/// The adapters with a VGA core, another chipset, and QEMU's precise retrace: the standard retrace bit
-/// flickers at every read.
+/// Checks the adapters with a VGA core, another chipset, and QEMU's precise retrace. (Without it, QEMU's
+/// retrace bit flickers at every read.)
 #[test]
 fn a_few_configurations_agree() {
     let few = few();
@@ -181,7 +190,7 @@ fn a_few_configurations_agree() {
     }
 }
 
-/// A configuration with this adapter and these arguments.
+/// Returns a configuration with this adapter and these arguments.
 pub fn with_arguments(ready: &Ready, vga: &str, arguments: &str) -> Config {
     Config {
         vga: vga.into(),
@@ -195,29 +204,29 @@ pub fn with_arguments(ready: &Ready, vga: &str, arguments: &str) -> Config {
 /// # Errors
 /// If the boot fails, or goldens differ.
 pub fn agrees(goldens: &[Golden], config: &Config) -> anyhow::Result<()> {
-    let mut machine = Vm::boot(config)?;
+    let mut vm = Vm::boot(config)?;
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory)?;
     let mut findings = Findings::default();
     for golden in goldens {
-        findings.check_cards(golden, &mut emulated, &mut machine, Transfer::Checksums)?;
+        findings.check_vgas(golden, &mut emulated, &mut vm, Transfer::Checksums)?;
     }
-    machine.leave()?;
+    vm.leave()?;
     findings.verdict(&report("configuration"))
 }
 
-/// Evidence that must be equal for every boot: all of video memory after three frames, and the counts of
-/// drawing them.
+/// Returns evidence that must be equal for every boot: all of video memory after three frames, and the counts
+/// of drawing them.
 pub fn evidence(config: &Config) -> anyhow::Result<Vec<String>> {
-    let mut machine = Vm::boot(config)?;
-    machine.show(&[0, 480, u32::MAX].map(FrameName::Number))?;
-    let mut evidence = machine.send(Command::Checksums(Content::Memory))?;
-    evidence.extend(machine.send(Command::Counts)?);
-    machine.leave()?;
+    let mut vm = Vm::boot(config)?;
+    vm.show(&[0, 480, u32::MAX].map(FrameName::Number))?;
+    let mut evidence = vm.send(Command::Checksums(Content::Memory))?;
+    evidence.extend(vm.send(Command::Counts)?);
+    vm.leave()?;
     Ok(evidence)
 }
 
-/// The emulated VGA's evidence for the same frames.
+/// Returns the emulated VGA's evidence for the same frames.
 pub fn emulated_evidence() -> Vec<String> {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
@@ -235,7 +244,7 @@ fn instruction_counting_changes_no_byte() {
     assert_eq!(evidence(&counting).unwrap(), emulated_evidence());
 }
 
-/// A folder with copies of two goldens.
+/// Returns a folder with copies of two goldens.
 fn two_goldens() -> TempDir {
     let copy = tempfile::tempdir().unwrap();
     for name in ["belt.toml", "belt.png", "north.toml", "north.png"] {
@@ -244,7 +253,7 @@ fn two_goldens() -> TempDir {
     copy
 }
 
-/// The findings of a folder's check.
+/// Returns the findings of a folder's check.
 fn found(folder: &Path) -> Vec<String> {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
@@ -301,7 +310,7 @@ fn missing_wrong_and_stray_files_in_a_golden_folder_are_found() {
     refused("has no golden frames");
 }
 
-/// The wrong frame is found even if it is as similar as possible to the right one.
+/// Checks that a wrong frame is found even if it is as similar as possible to the right frame.
 #[test]
 fn a_golden_with_the_wrong_frame_is_found() {
     let mut memory = backend::memory();
@@ -353,13 +362,13 @@ fn bless_lists_the_changes_and_writes_the_goldens() {
 fn all_of_video_memory_equals_the_emulated_vgas() {
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
-    let mut machine = Vm::boot(&config()).unwrap();
+    let mut vm = Vm::boot(&config()).unwrap();
     let frames = [0, 100, 200, 4_000_000_000, 300].map(FrameName::Number);
     emulated.show(&frames).unwrap();
-    machine.show(&frames).unwrap();
+    vm.show(&frames).unwrap();
     let (expected, got) = (
         emulated.dump(Content::Memory).unwrap(),
-        machine.dump(Content::Memory).unwrap(),
+        vm.dump(Content::Memory).unwrap(),
     );
     assert_eq!(got.pixels.len(), 4 * 0x1_0000);
     let golden = &goldens()[0];
@@ -370,7 +379,7 @@ fn all_of_video_memory_equals_the_emulated_vgas() {
         &Capture::Dump(expected),
         &Capture::Dump(got),
     );
-    machine.leave().unwrap();
+    vm.leave().unwrap();
     conclude(findings, "memory");
 }
 
@@ -402,7 +411,7 @@ fn emulate_and_dump_write_the_same_files() {
             );
         }
     }
-    // Five frames, with a text and a PNG of each.
+    // Five frames, each as a dump and as a PNG.
     assert_eq!(
         crystal_ball(&["diff", "a", "b"]),
         "equal: 10 pairs, 953344 pixels\n"
@@ -425,15 +434,15 @@ fn emulate_and_dump_write_the_same_files() {
     assert!(alone == after);
 }
 
-/// A write to the card, one byte at a time.
+/// A write of one byte to the VGA.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum CardWrite {
+enum VgaWrite {
     Port(u16, u8),
     Memory(u16, u8),
 }
 
-impl CardWrite {
-    /// Parses a line of QEMU's trace; `None` for another device.
+impl VgaWrite {
+    /// Parses a line of QEMU's trace; `None` for a write to another device.
     fn traced(line: &str) -> Option<Self> {
         let hex = |name: &str| {
             let mut words = line.split([' ', ',']).skip_while(|word| *word != name);
@@ -451,7 +460,7 @@ impl CardWrite {
         ours.then(|| Self::Memory((at - 0xA_0000) as u16, value as u8))
     }
 
-    /// The writes of an access in the emulated VGA's log: a word goes to its port and the next port.
+    /// Returns the writes of an access in the emulated VGA's log: a word goes to its port and the next port.
     fn logged(access: &Access) -> Vec<Self> {
         match *access {
             Access::Out8(port, value) => vec![Self::Port(port, value)],
@@ -465,49 +474,48 @@ impl CardWrite {
     }
 }
 
-/// Compares QEMU's own record of every write with the emulated VGA's log. Neither the kernel nor this project
-/// made that record, so it proves, without trust in the kernel, that each column needs only one Map Mask
-/// write.
+/// Compares QEMU's trace of every write with the emulated VGA's log. QEMU makes the trace, so it proves,
+/// without trust in the kernel, that each column needs only one Map Mask write.
 #[test]
 fn qemus_trace_of_a_frame_equals_the_emulated_vgas_log() {
     let folder = tempfile::tempdir().unwrap();
     let trace = folder.path().join("trace");
     let mut config = config();
     config.arguments = vec!["-D".into(), trace.clone().into()];
-    let mut machine = Vm::boot(&config).unwrap();
+    let mut vm = Vm::boot(&config).unwrap();
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
-    // The fourth frame erases what the first left on its page.
+    // The fourth frame erases the first frame from its page.
     let before = [0, 60, 120].map(FrameName::Number);
     emulated.show(&before).unwrap();
-    machine.show(&before).unwrap();
+    vm.show(&before).unwrap();
     let events = ["vga_std_write_io", "memory_region_ops_write"];
     for event in events {
-        machine.trace(event, true).unwrap();
+        vm.trace(event, true).unwrap();
     }
     let show = Command::Show(FrameName::Number(180));
-    machine.send(show).unwrap();
+    vm.send(show).unwrap();
     for event in events {
-        machine.trace(event, false).unwrap();
+        vm.trace(event, false).unwrap();
     }
-    machine.leave().unwrap();
+    vm.leave().unwrap();
     emulated.vga().start_log();
     emulated.send(show).unwrap();
     let log = emulated.vga().take_log();
-    let logged: Vec<_> = log.iter().flat_map(CardWrite::logged).collect();
+    let logged: Vec<_> = log.iter().flat_map(VgaWrite::logged).collect();
     let text = std::fs::read_to_string(&trace).unwrap();
-    let traced: Vec<_> = text.lines().filter_map(CardWrite::traced).collect();
+    let traced: Vec<_> = text.lines().filter_map(VgaWrite::traced).collect();
     for (i, (traced, logged)) in traced.iter().zip(&logged).enumerate() {
         assert_eq!(
             traced, logged,
-            "write {i} of QEMU's trace and of the emulated card's log"
+            "write {i} of QEMU's trace and of the emulated VGA's log"
         );
     }
-    assert_eq!(traced.len(), logged.len(), "one of the two has more writes");
+    assert_eq!(traced.len(), logged.len(), "one side has more writes");
     // 3C4h index 2 is Map Mask: one write to erase, and one for each column drawn.
     let map_masks = traced
         .windows(2)
-        .filter(|pair| matches!(pair, [CardWrite::Port(0x3C4, 2), CardWrite::Port(0x3C5, _)]));
+        .filter(|pair| matches!(pair, [VgaWrite::Port(0x3C4, 2), VgaWrite::Port(0x3C5, _)]));
     let counts = emulated.send(Command::Counts).unwrap();
     let mut columns = counts[0].split(' ').skip_while(|word| *word != "columns");
     let columns: usize = columns.nth(1).unwrap().parse().unwrap();

@@ -1,4 +1,4 @@
-//! Users' files: which make a model, which are refused, and with which messages.
+//! Users' files: the files that make a model, the files that are refused, and the messages.
 
 use std::fs;
 use std::io::{Read, Write};
@@ -8,7 +8,7 @@ use std::process::{Command as Process, Stdio};
 use rustix::process::{Pid, Signal};
 use tempfile::TempDir;
 
-/// A folder with a model's files.
+/// Returns a folder with a model's files.
 fn files() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("thing.obj"), CUBE).unwrap();
@@ -45,7 +45,7 @@ fn run(folder: &Path, arguments: &[&str]) -> (Option<i32>, String) {
     )
 }
 
-/// A PNG of these chunks.
+/// Returns a PNG of these chunks.
 fn png_of(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
     let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
     for (kind, data) in chunks {
@@ -60,19 +60,19 @@ fn png_of(chunks: &[(&[u8; 4], &[u8])]) -> Vec<u8> {
     bytes
 }
 
-/// A PNG's header: size, depth and colour type.
+/// Returns a PNG's header: size, depth and colour type.
 fn png_header(width: u32, height: u32, depth: u8, colour: u8) -> Vec<u8> {
     let size = [width.to_be_bytes(), height.to_be_bytes()].concat();
     [&size[..], &[depth, colour, 0, 0, 0]].concat()
 }
 
-/// A PNG whose header gives a size, but which contains no pixels.
+/// Returns a PNG whose header gives a size, but which contains no pixels.
 fn empty_png(width: u32, height: u32) -> Vec<u8> {
     let header = png_header(width, height, 8, 2);
     png_of(&[(b"IHDR", &header), (b"IDAT", &[]), (b"IEND", &[])])
 }
 
-/// A PNG with a palette of `bytes` bytes.
+/// Returns a PNG with a palette of `bytes` bytes.
 fn palette_png(bytes: usize) -> Vec<u8> {
     let header = png_header(1, 1, 8, 3);
     let palette = vec![9; bytes];
@@ -153,7 +153,7 @@ fn a_cube_is_drawn_alike_from_every_spelling_of_its_file() {
         r"6 faces, 5 statements skipped (1 't', 2 'vw', 1 '\x1b[31m', 1 'l'), built-in texture";
     assert!(stderr.contains(left_out), "{stderr}");
     assert!(same == frame);
-    // By name, too.
+    // The scene can also be chosen by name.
     let (code, _, same) = emulate(path, &["--model", "a.obj", "--scene", "model"]);
     assert_eq!((code, same.as_ref()), (Some(0), Some(&frame)));
     let (code, _, ball) = emulate(path, &["--model", "a.obj", "--scene", "ball"]);
@@ -183,7 +183,7 @@ fn faces_that_look_away_are_reported_with_the_winding_rule() {
             turned(CUBE),
             Some("note: every face looks inward, so the model is inside out."),
         ),
-        // Some are right.
+        // Some faces are the right way round.
         (format!("{}f 1 2 3 4\n", turned(sheet)), None),
     ] {
         fs::write(path.join("a.obj"), &text).unwrap();

@@ -21,7 +21,7 @@ use crate::ready::config;
 /// Alters a line from the kernel; the line includes its end.
 type Alter = Box<dyn FnMut(&[u8]) -> Vec<u8> + Send>;
 
-/// A machine whose serial line passes through `alter`.
+/// Returns a VM whose serial line passes through `alter`.
 fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Vm {
     let config = Config {
         arguments: arguments.into_iter().map(Into::into).collect(),
@@ -33,12 +33,12 @@ fn tapped(arguments: Vec<String>, limits: Limits, alter: Alter) -> Vm {
         thread::spawn(move || pass_on(kernel, tap, alter));
         host
     };
-    let mut machine = Vm::boot_through(&config, tap).expect("boots");
-    machine.show(&[FrameName::Number(480)]).expect("shows");
-    machine
+    let mut vm = Vm::boot_through(&config, tap).expect("boots");
+    vm.show(&[FrameName::Number(480)]).expect("shows");
+    vm
 }
 
-/// The tap.
+/// Passes bytes on in both directions, and alters the lines from the kernel.
 fn pass_on(kernel: UnixStream, mut host: UnixStream, mut alter: Alter) {
     let (mut from_host, mut to_kernel) = (host.try_clone().unwrap(), kernel.try_clone().unwrap());
     thread::spawn(move || std::io::copy(&mut from_host, &mut to_kernel));
@@ -80,13 +80,13 @@ fn dump_altered_within(
             None => line.to_vec(),
         }
     });
-    let mut machine = tapped(Vec::new(), limits, alter);
-    let dump = machine.dump(Content::Page)?;
-    machine.leave()?;
+    let mut vm = tapped(Vec::new(), limits, alter);
+    let dump = vm.dump(Content::Page)?;
+    vm.leave()?;
     Ok(dump)
 }
 
-/// The bytes of a dump as the kernel sent them, and the dump that the machine made of them.
+/// Returns the bytes of a dump as the kernel sent them, and the dump parsed from them.
 fn recorded() -> (Vec<u8>, Dump) {
     let (send, sent) = mpsc::channel();
     let mut records = false;
@@ -98,9 +98,9 @@ fn recorded() -> (Vec<u8>, Dump) {
         records &= !line.starts_with(b"end ");
         line.to_vec()
     };
-    let mut machine = tapped(Vec::new(), Limits::default(), Box::new(alter));
-    let dump = machine.dump(Content::Page).unwrap();
-    machine.leave().unwrap();
+    let mut vm = tapped(Vec::new(), Limits::default(), Box::new(alter));
+    let dump = vm.dump(Content::Page).unwrap();
+    vm.leave().unwrap();
     (sent.try_iter().flatten().collect(), dump)
 }
 
@@ -121,7 +121,7 @@ fn altered(recorded: &[u8], step: LineFault) -> Vec<u8> {
     lines.flat_map(alter).collect()
 }
 
-/// One boot sends a dump; the test then alters its bytes in every way that could happen.
+/// Records a dump from one boot, and alters its bytes in every way that a faulty line could.
 #[test]
 fn every_kind_of_damage_to_a_dump_is_detected_and_named() {
     let (bytes, dump) = recorded();
@@ -198,7 +198,8 @@ fn every_kind_of_damage_to_a_dump_is_detected_and_named() {
     }
 }
 
-/// A fault in a single line is the run's verdict; in the next test no single line shows the fault.
+/// Checks that a fault in a single line is the run's verdict. In the next test no single line shows the
+/// fault.
 #[test]
 fn a_garbled_dump_ends_the_run() {
     let failure = ExpectedFailure::of(dump_altered(|n, line| {
@@ -229,7 +230,7 @@ fn swapped_lines_are_detected_by_their_numbers() {
     assert!(message.contains("expected 'line 100', found"), "{message}");
 }
 
-/// The changes that a terminal makes to line ends have no effect.
+/// Checks that changed line ends, as a terminal sends them, have no effect.
 #[test]
 fn line_ends_of_a_terminal_are_accepted() {
     let returned = |_, line: &[u8]| [&line[..line.len() - 1], b"\r\n"].concat();
@@ -251,7 +252,7 @@ fn a_hang_in_the_middle_of_a_dump_is_reported_as_a_hang() {
     assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }
 
-/// A non-maskable interrupt, for which the kernel knows no reason, arrives between two lines.
+/// Sends a non-maskable interrupt, which the kernel does not expect, between two lines.
 #[test]
 fn a_crash_in_the_middle_of_a_dump_is_reported_as_an_exception() {
     let folder = tempfile::tempdir().unwrap();
@@ -267,8 +268,8 @@ fn a_crash_in_the_middle_of_a_dump_is_reported_as_an_exception() {
         line.to_vec()
     };
     let arguments = vec!["-monitor".into(), monitor];
-    let mut machine = tapped(arguments, Limits::default(), Box::new(alter));
-    let failure = ExpectedFailure::of(machine.dump(Content::Page));
+    let mut vm = tapped(arguments, Limits::default(), Box::new(alter));
+    let failure = ExpectedFailure::of(vm.dump(Content::Page));
     let Verdict::Exception { report } = &failure.verdict else {
         panic!("{}", failure);
     };
@@ -290,7 +291,7 @@ fn strike(monitor: &Path) {
     }
 }
 
-/// Nobody reads for a while: the kernel waits, and then everything arrives in order.
+/// Checks that while the host does not read, the kernel waits, and that everything then arrives in order.
 #[test]
 fn the_kernel_waits_for_a_host_that_stops_reading() {
     let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
@@ -301,33 +302,33 @@ fn the_kernel_waits_for_a_host_that_stops_reading() {
         }
         line.to_vec()
     };
-    let mut machine = tapped(Vec::new(), Limits::default(), Box::new(alter));
-    let mut asked = Vec::new();
+    let mut vm = tapped(Vec::new(), Limits::default(), Box::new(alter));
+    let mut commands = Vec::new();
     // More than all buffers on the way can contain.
     for frame in 0..5 {
-        asked.push(format!("show {frame}"));
-        asked.push("dump".to_string());
+        commands.push(format!("show {frame}"));
+        commands.push("dump".to_string());
     }
-    for line in &asked {
-        machine.send_line(line).unwrap();
+    for line in &commands {
+        vm.send_line(line).unwrap();
     }
-    // Longer than the line's buffers last.
-    machine.rest(Duration::from_secs(2)).unwrap();
+    // Longer than the kernel needs to fill all buffers.
+    vm.rest(Duration::from_secs(2)).unwrap();
     go.send(()).unwrap();
-    for line in &asked {
-        let mut answer = machine.answer(line).unwrap();
+    for line in &commands {
+        let mut answer = vm.answer(line).unwrap();
         assert_eq!(answer.pop().unwrap(), format!("ok {line}"));
         if line == "dump" {
             Dump::from_lines(&answer).unwrap();
         }
     }
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
 #[test]
 fn noise_on_the_line_is_answered_and_harmless() {
-    let mut machine = Vm::boot(&config()).unwrap();
-    machine.send(Command::Hold).unwrap();
+    let mut vm = Vm::boot(&config()).unwrap();
+    vm.send(Command::Hold).unwrap();
     for (noise, reason) in [
         (b"\x00\xFF\x80\n".to_vec(), "the byte 00"),
         (vec![b'x'; 200_000], "longer than 700 bytes"),
@@ -339,31 +340,31 @@ fn noise_on_the_line_is_answered_and_harmless() {
         (b"shew 1\n".to_vec(), "unknown command 'shew'"),
         (b"show 1 *00000000\n".to_vec(), "has checksum 00000000"),
     ] {
-        machine.send_raw(&noise).unwrap();
+        vm.send_raw(&noise).unwrap();
         if !noise.ends_with(b"\n") {
-            machine.send_raw(b"\n").unwrap();
+            vm.send_raw(b"\n").unwrap();
         }
-        let answer = machine.answer("noise").unwrap();
+        let answer = vm.answer("noise").unwrap();
         assert!(
             answer[0].starts_with("error ") && answer[0].contains(reason),
             "{answer:?}"
         );
     }
     // A command in two parts, and a command as a terminal sends it.
-    machine.send_raw(b"sho").unwrap();
-    machine.rest(Duration::from_millis(50)).unwrap();
-    machine.send_raw(b"w 3\r\n").unwrap();
-    let answer = machine.answer("show 3").unwrap();
+    vm.send_raw(b"sho").unwrap();
+    vm.rest(Duration::from_millis(50)).unwrap();
+    vm.send_raw(b"w 3\r\n").unwrap();
+    let answer = vm.answer("show 3").unwrap();
     assert_eq!(answer.last().unwrap(), "ok show 3");
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
 /// Sends a flood of invalid lines. Each gets an answer, and the frame does not change.
 #[test]
 fn a_flood_of_noise_changes_no_byte() {
-    let mut machine = Vm::boot(&config()).unwrap();
-    machine.show(&[FrameName::Number(7)]).unwrap();
-    let before = machine.send(Command::Checksums(Content::Memory)).unwrap();
+    let mut vm = Vm::boot(&config()).unwrap();
+    vm.show(&[FrameName::Number(7)]).unwrap();
+    let before = vm.send(Command::Checksums(Content::Memory)).unwrap();
     let mut state = seeded::generator().get_seed() << 1 | 1;
     let mut random = move || {
         // Knuth's MMIX generator; only its high bits are good.
@@ -374,14 +375,14 @@ fn a_flood_of_noise_changes_no_byte() {
     };
     // The flood ends in the middle of a line, and the LF after it ends that line.
     let flood: Vec<u8> = (0..100_000).map(|_| random()).chain([b'x']).collect();
-    machine.send_raw(&flood).unwrap();
-    machine.send_raw(b"\nversion\n").unwrap();
+    vm.send_raw(&flood).unwrap();
+    vm.send_raw(b"\nversion\n").unwrap();
     let pairs = std::iter::once(&0).chain(&flood).zip(&flood);
     let ends = pairs.filter(|pair| matches!(pair, (_, b'\r') | (0..=12 | 14.., b'\n')));
     let ends = ends.count();
     let mut errors = 0;
     loop {
-        let answer = machine.answer("noise").unwrap();
+        let answer = vm.answer("noise").unwrap();
         match answer.last().unwrap().as_str() {
             "ok version" => break,
             line => assert!(line.starts_with("error "), "{line}"),
@@ -390,13 +391,13 @@ fn a_flood_of_noise_changes_no_byte() {
     }
     assert_eq!(errors, ends + 1);
     assert_eq!(
-        machine.send(Command::Checksums(Content::Memory)).unwrap(),
+        vm.send(Command::Checksums(Content::Memory)).unwrap(),
         before
     );
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
-/// An endless flood of lines that are not the answer: the wait still ends.
+/// Checks that the wait ends during an endless flood of lines that are not the answer.
 #[test]
 fn an_endless_flood_of_lines_without_an_answer_is_reported_as_a_hang() {
     let (go, wait): (Sender<()>, Receiver<()>) = mpsc::channel();
@@ -415,15 +416,15 @@ fn an_endless_flood_of_lines_without_an_answer_is_reported_as_a_hang() {
         });
         host
     };
-    let mut machine = Vm::boot_through(&config(), tap).unwrap();
+    let mut vm = Vm::boot_through(&config(), tap).unwrap();
     // From here on the kernel sends nothing that could come between two lines of the flood.
-    machine.wait_until_running().unwrap();
-    machine.set_limits(Limits {
+    vm.wait_until_running().unwrap();
+    vm.set_limits(Limits {
         answer: Duration::from_millis(200),
         ..Limits::default()
     });
     go.send(()).unwrap();
-    let failure = ExpectedFailure::of(machine.answer("nothing"));
+    let failure = ExpectedFailure::of(vm.answer("nothing"));
     let waited_for = "the answer to 'nothing'".into();
     assert_eq!(failure.verdict, Verdict::Hang { waited_for });
 }

@@ -9,14 +9,14 @@ use texmap::{Mapper, Order};
 
 use crate::ready::READY;
 
-/// The mappers with these names.
+/// Returns the mappers with these names.
 fn mappers(names: &[&str]) -> Vec<Mapper> {
     let named = names.iter().map(|name| Mapper::parse(name));
     named.map(|mapper| mapper.expect("a mapper")).collect()
 }
 
-/// Measures a mapper of each kind. The run itself checks that figures repeat under `-icount`, that the number
-/// of pixels is equal without it, and that QEMU and the emulated VGA draw the same frames.
+/// Measures a mapper of each kind. The measurement checks that figures repeat under `-icount`, that the
+/// number of pixels is equal without it, and that QEMU and the emulated VGA draw the same frames.
 #[test]
 fn the_benchmark_kernel_boots_and_its_figures_are_plausible() {
     LazyLock::force(&READY);
@@ -45,7 +45,8 @@ fn the_benchmark_kernel_boots_and_its_figures_are_plausible() {
         ] {
             assert_eq!(row.cost(work).pixels, screen, "{name}: {work}");
         }
-        // A store, and a share of a counter and a branch; the share is larger where nothing is unrolled.
+        // A store, and a share of a counter and a branch. The share is larger for loops that are not
+        // unrolled.
         for work in [Work::BareRam, Work::BareCard] {
             let bare = a_pixel(work);
             assert!((1.0..4.5).contains(&bare), "{name}: {work} {bare}");

@@ -25,7 +25,7 @@ f 1/1 2/2 -1/3\nf 2/1 3/2 -1/3\nf 3/1 4/2 -1/3\nf 4/1 5/2 -1/3
 f 5/1 6/2 -1/3\nf 6/1 7/2 -1/3\nf 7 8 -1\nf 8 1 -1
 ";
 
-/// A folder with a model's files.
+/// Returns a folder with a model's files.
 fn files() -> TempDir {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("thing.obj"), OBJ).unwrap();
@@ -47,8 +47,8 @@ fn model() -> Model {
     Model::load(&obj, Some(&png)).unwrap()
 }
 
-/// A machine whose ramdisk contains these bytes. If `model_file` is a checksum, the machine must accept the
-/// model file with it.
+/// Boots a VM whose ramdisk contains these bytes. If `model_file` is a checksum, the kernel must accept the
+/// model file with this checksum.
 fn boot(ramdisk: Vec<u8>, model_file: Option<u32>) -> Vm {
     let options = Options {
         ramdisk: Some(ramdisk),
@@ -66,7 +66,7 @@ fn boot(ramdisk: Vec<u8>, model_file: Option<u32>) -> Vm {
 fn qemu_and_the_emulated_vga_draw_a_model_alike_and_name_it_in_their_dumps() {
     let model = model();
     let model_file = model.file();
-    let mut machine = boot(model.bytes.clone(), Some(model_file.checksum()));
+    let mut vm = boot(model.bytes.clone(), Some(model_file.checksum()));
     let mut memory = backend::memory();
     let mut emulated = EmulatedDemo::with(&mut memory, Some(&model_file)).unwrap();
     let frames = [
@@ -81,40 +81,40 @@ fn qemu_and_the_emulated_vga_draw_a_model_alike_and_name_it_in_their_dumps() {
     ];
     for frame in frames {
         let [real, emulated_dump]: [_; 2] =
-            [&mut machine as &mut dyn Asked, &mut emulated].map(|card| card.dump_of(frame));
+            [&mut vm as &mut dyn DynBackend, &mut emulated].map(|backend| backend.dump_of(frame));
         assert_eq!(real, emulated_dump, "{frame}");
         assert_eq!(real.header.scene, "model");
         assert_eq!(real.header.model_file, Some(model_file.checksum()));
-        assert_eq!(machine.screen().unwrap(), emulated.screen().unwrap());
+        assert_eq!(vm.screen().unwrap(), emulated.screen().unwrap());
     }
-    // A built-in scene is no loaded model, whatever the ramdisk contains.
+    // A built-in scene has no model file, whatever the ramdisk contains.
     let ball = Command::Set(Setting::Scene, Word::new("ball"));
-    for card in [&mut machine as &mut dyn Asked, &mut emulated] {
-        let scenes = card.asked(Command::Set(Setting::Scene, None));
+    for backend in [&mut vm as &mut dyn DynBackend, &mut emulated] {
+        let scenes = backend.answer(Command::Set(Setting::Scene, None));
         assert!(scenes.last().unwrap().starts_with("*model "), "{scenes:?}");
-        card.asked(ball);
-        assert_eq!(card.dumped().header.model_file, None);
+        backend.answer(ball);
+        assert_eq!(backend.dump_page().header.model_file, None);
     }
-    machine.leave().unwrap();
+    vm.leave().unwrap();
 }
 
-/// Allows both cards in one list.
-trait Asked {
-    fn asked(&mut self, command: Command) -> Vec<String>;
-    fn dumped(&mut self) -> frames::dump::Dump;
+/// A backend whose results are unwrapped. As a trait object, it allows both backends in one list.
+trait DynBackend {
+    fn answer(&mut self, command: Command) -> Vec<String>;
+    fn dump_page(&mut self) -> frames::dump::Dump;
     fn dump_of(&mut self, frame: FrameName) -> frames::dump::Dump {
-        self.asked(Command::Hold);
-        self.asked(Command::Show(frame));
-        self.dumped()
+        self.answer(Command::Hold);
+        self.answer(Command::Show(frame));
+        self.dump_page()
     }
 }
 
-impl<C: Backend> Asked for C {
-    fn asked(&mut self, command: Command) -> Vec<String> {
+impl<B: Backend> DynBackend for B {
+    fn answer(&mut self, command: Command) -> Vec<String> {
         self.send(command).unwrap()
     }
 
-    fn dumped(&mut self) -> frames::dump::Dump {
+    fn dump_page(&mut self) -> frames::dump::Dump {
         self.dump(Content::Page).unwrap()
     }
 }
@@ -124,9 +124,9 @@ fn a_damaged_model_file_is_reported_and_the_built_in_scenes_still_work() {
     let mut bytes = model().bytes;
     let middle = bytes.len() / 2;
     bytes[middle] ^= 4;
-    let mut machine = boot(bytes, None);
-    machine.wait_until_running().unwrap();
-    let answer = machine.model_answer().unwrap().to_string();
+    let mut vm = boot(bytes, None);
+    vm.wait_until_running().unwrap();
+    let answer = vm.model_answer().unwrap().to_string();
     assert!(
         answer.starts_with("refused model: the header states checksum "),
         "{answer}"
@@ -135,6 +135,6 @@ fn a_damaged_model_file_is_reported_and_the_built_in_scenes_still_work() {
     let mut emulated = EmulatedDemo::new(&mut memory).unwrap();
     let ball = emulated.dump_of(FrameName::Number(480));
     assert_eq!(ball.header.scene, "ball");
-    assert_eq!(machine.dump_of(FrameName::Number(480)), ball);
-    machine.leave().unwrap();
+    assert_eq!(vm.dump_of(FrameName::Number(480)), ball);
+    vm.leave().unwrap();
 }

@@ -1,9 +1,9 @@
-//! Shows that checks can fail: those of the emulated VGA, of the Mode X driver, of coverage, of mappers that
-//! stay within an error and of visible spans. Run by `cargo named-mutants`.
+//! Shows that checks can fail: the checks of the emulated VGA, of the Mode X driver, of coverage, of mappers
+//! that stay within an error, and of visible spans. Run it by `cargo named-mutants`.
 //!
-//! A mutant is a plausible mistake that is planted into a copy of the workspace: in the driver, in the
-//! emulated VGA that should detect the driver's mistakes, or in the renderer. The tests of the affected
-//! crates run there, and at least one of them must fail: if a mutant survives, a test is missing.
+//! A mutant is a plausible mistake in a copy of the workspace: in the driver, in the emulated VGA that should
+//! detect the driver's mistakes, or in the renderer. The tests of the affected crates run there, and at least
+//! one of them must fail: if a mutant survives, a test is missing.
 //!
 //! A mutant names its place by the exact text, which must occur in the file exactly once. Every `cargo test`
 //! checks that, so the list stays up to date.
@@ -47,11 +47,11 @@ const DRAWN: &str = "kernel/modex/src/drawn.rs";
 const REGISTERS: &str = "kernel/modex/src/registers.rs";
 
 /// The crates whose tests must kill a mutant of the driver or of the emulated VGA.
-const CARD: [&str; 2] = ["--package=vga", "--package=modex"];
+const VGA_TESTS: [&str; 2] = ["--package=vga", "--package=modex"];
 /// The crates whose tests must kill a mutant of coverage or of a mapper.
-const MAPPER: [&str; 2] = ["--package=texmap", "--package=oracle"];
+const MAPPER_TESTS: [&str; 2] = ["--package=texmap", "--package=oracle"];
 /// The crates whose tests must kill a mutant of visibility.
-const SEEN: [&str; 2] = ["--package=scene", "--package=oracle"];
+const VISIBILITY_TESTS: [&str; 2] = ["--package=render", "--package=oracle"];
 
 /// Columns: name; file; text; replacement.
 #[rustfmt::skip]
@@ -71,7 +71,7 @@ const MUTANTS: &[Mutant] = &[
         "self.bottom[group] = bottom;", "self.bottom[group] = bottom - 1;"),
     mutant("erase too small by one line at the top", DRAWN,
         "self.rise[group] = rise;", "self.rise[group] = rise - 1;"),
-    mutant("presented without what the page had before", DRIVER,
+    mutant("presenting leaves the page's earlier drawing", DRIVER,
         "offscreen.drawn().or(&self.drawn[self.back])", "*offscreen.drawn()"),
     mutant("erase reaches one plane", DRIVER,
         "write(&mut self.bus, SEQUENCER, MAP_MASK, ALL_PLANES);",
@@ -84,9 +84,9 @@ const MUTANTS: &[Mutant] = &[
         "if self.visible[self.back] {", "if false {"),
     mutant("flip not waited for", DRIVER,
         "if let Err(stuck) = self.wait_for_frame() {", "if let Err(stuck) = Ok::<(), Stuck>(()) {"),
-    mutant("planes not proved", DRIVER,
+    mutant("planes not checked", DRIVER,
         "check_planes(bus)?;", ""),
-    mutant("a Cirrus taken for granted", DRIVER,
+    mutant("failed unlock of a Cirrus ignored", DRIVER,
         "if !unlock_cirrus(bus) {", "if !unlock_cirrus(bus) && false {"),
     mutant("mode set waits for no frame", DRIVER,
         "self.wait_for_frame().map_err(SetError::Beam)?;", ""),
@@ -131,12 +131,12 @@ const MUTANTS: &[Mutant] = &[
         "map_mask >> plane & 1 == 1", "map_mask >> plane & 1 <= 1"),
     mutant("start address not latched", CRTC,
         "        self.latched\n", "        self.start_address()\n"),
-    mutant("start address never taken over again", CRTC,
+    mutant("start address latched only once", CRTC,
         "self.latched = self.start_address();",
         "self.latched = self.latched.or(self.start_address());"),
     mutant("CRTC protect ignored", CRTC,
         "if index <= 7 && protected {", "if false && index <= 7 && protected {"),
-    mutant("CRTC protection reported, but the write done", CRTC,
+    mutant("CRTC protection reported, but the register written", CRTC,
         "            // The chip drops the write, but for CR7 bit 4.\n",
         "            self.registers[usize::from(index)] = Some(value);\n"),
     mutant("off by one in scan lines", MONITOR,
@@ -145,7 +145,7 @@ const MUTANTS: &[Mutant] = &[
         "bit(0x07, 5, 9)) + 2,", "bit(0x07, 5, 9)) + 1,"),
     mutant("times not compared", MONITOR,
         "given.2 != needed.2", "false"),
-    mutant("time stands still", CRTC,
+    mutant("beam does not move", CRTC,
         "self.ahead -= clocks;", ""),
     mutant("8-bit DAC", DAC,
         "Some(value & 0x3F);
@@ -182,10 +182,10 @@ const MUTANTS: &[Mutant] = &[
         "[old, self.start_address()]", "[old, None]"),
     mutant("DISPI not detected", VGA,
         "dispi: true,", "dispi: false,"),
-    mutant("faults forgotten with the card", VGA,
+    mutant("faults lost when the VGA is dropped", VGA,
         "if !self.faults.is_empty() && ", "if false && "),
     // Coverage and the exact mapper.
-    mutant("less for less or equal in the edge rule", EDGES,
+    mutant("less-than for less-or-equal in the edge rule", EDGES,
         "tie: |_| true,", "tie: |_| false,"),
     mutant("columns by the transposed rule", EDGES,
         "tie: |dy| dy <= 0,", "tie: |_| true,"),
@@ -202,11 +202,11 @@ const MUTANTS: &[Mutant] = &[
     mutant("a quotient rounded", EXACT,
         "(a / c) as usize", "((a + c / 2) / c) as usize"),
     // Mappers within an error, and visibility.
-    mutant("a line kept that errs too much", ADAPTIVE,
+    mutant("a line accepted beyond the error bound", ADAPTIVE,
         "c > 0 && self.near * self.chords.cut(c) >= self.least", "c > 0"),
-    mutant("a clamped end not paid for", ADAPTIVE,
+    mutant("a clamped end missing from the error bound", ADAPTIVE,
         "self.chords.least(steps, self.outside.max(there.1))", "self.chords.least(steps, 0)"),
-    mutant("a line from its wrong end", ADAPTIVE,
+    mutant("a line started at its wrong end", ADAPTIVE,
         "stepper = stepper.every(-1, i32::from(len) - 1);", "stepper = stepper.every(-1, i32::from(steps));"),
     mutant("a pixel after the lines left out", ADAPTIVE,
         "let len = self.len - self.done;\n        if len == 0 {",
@@ -214,14 +214,14 @@ const MUTANTS: &[Mutant] = &[
     mutant("a line judged by one end alone", BOUNDS,
         "mean >> 32 == 0 && self.cut(from) * self.cut(to) >= mean * mean",
         "mean >> 32 == 0 && self.cut(from) >= mean"),
-    mutant("steps that are cut not paid for", BOUNDS,
+    mutant("truncated steps missing from the error bound", BOUNDS,
         "let spent = u64::from(pixels) + u64::from(outside);", "let spent = u64::from(outside);"),
     mutant("the error of a line halved", BOUNDS,
         "exponent + more + 14 -", "exponent + more + 13 -"),
-    mutant("a map's error not paid for", WITHIN,
+    mutant("a map's error missing from the error bound", WITHIN,
         "off = off.max(error as i64 + outside + (change >> 28));",
         "off = off.max(outside + (change >> 28));"),
-    mutant("the dearer axis", WITHIN,
+    mutant("the costlier axis chosen", WITHIN,
         "match rows < columns {", "match rows > columns {"),
     mutant("a reciprocal not rounded down", RECIPROCAL,
         "value: (1 << 63) / (u64::from(high) + 1),", "value: (1 << 63) / u64::from(high),"),
@@ -262,7 +262,7 @@ impl Mutant {
     }
 }
 
-/// Longest time of a run of cargo: a hundred times the usual time.
+/// The time limit of a run of cargo: a hundred times the usual time.
 const LIMIT: Duration = Duration::from_secs(300);
 
 #[test]
@@ -278,10 +278,10 @@ fn the_text_of_every_mutant_occurs_once_in_the_source() {
 }
 
 #[test]
-#[ignore = "builds and tests for minutes, once for each mutant; by `cargo named-mutants`"]
+#[ignore = "builds and tests for minutes, once for each mutant; run it by `cargo named-mutants`"]
 fn every_mutant_is_killed() {
     let copy = WorkspaceCopy::new();
-    for packages in [CARD, MAPPER, SEEN] {
+    for packages in [VGA_TESTS, MAPPER_TESTS, VISIBILITY_TESTS] {
         let run = copy.cargo(&["test"], packages);
         assert!(run.succeeded, "without a mutant:\n{}", run.output);
     }
@@ -372,9 +372,9 @@ impl WorkspaceCopy {
         };
         fs::write(&file, planted).unwrap();
         let packages = match mutant.file {
-            VISIBLE => SEEN,
-            file if file.starts_with("kernel/texmap") => MAPPER,
-            _ => CARD,
+            VISIBLE => VISIBILITY_TESTS,
+            file if file.starts_with("kernel/texmap") => MAPPER_TESTS,
+            _ => VGA_TESTS,
         };
         let built = self.cargo(&["test", "--no-run"], packages);
         let tested = built
@@ -428,7 +428,7 @@ impl WorkspaceCopy {
         };
         let mut output = fs::read_to_string(path).unwrap();
         if status.is_none() {
-            output.push_str("\nstopped: it took too long\n");
+            output.push_str("\nstopped at the time limit\n");
         }
         CargoRun {
             succeeded: status.is_some_and(|status| status.success()),

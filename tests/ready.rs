@@ -11,8 +11,8 @@ pub static READY: LazyLock<Ready> = LazyLock::new(|| with(&Options::default()));
 
 /// Runs the set-up with these options.
 ///
-/// If the set-up fails, no test of this program can pass, so the program ends at once. Its reason is then the
-/// last line on the screen, instead of one of fifty failures.
+/// If the set-up fails, no test of this program can pass, so the program ends at once. The reason is then the
+/// last line on the screen, and not one of fifty failures.
 pub fn with(options: &Options) -> Ready {
     setup::ready(options).unwrap_or_else(|error| {
         // Not with `eprintln!`, whose output libtest keeps until the test has ended.
@@ -26,7 +26,7 @@ pub fn with(options: &Options) -> Ready {
     })
 }
 
-/// The image on QEMU's standard adapter, without a window.
+/// Returns the image on QEMU's standard adapter, without a window.
 pub fn config() -> Config {
     Config::new(&READY)
 }

@@ -28,7 +28,7 @@ fn crystal_ball(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, Stri
     )
 }
 
-/// The only image of a PNG.
+/// Returns the only image of a PNG.
 fn frame(path: &Path) -> IndexedImage {
     match Capture::read(path).unwrap() {
         Capture::Png(frame) => frame,

@@ -1,4 +1,4 @@
-//! The set-up from the outside, with success and failure, in sandboxes. A sandbox is a process with a
+//! The set-up from the outside, in sandboxes, with success and failure. A sandbox is a process with a
 //! separate cache, home, target folder and `PATH`, where small shell scripts replace rustup, apt-get, cargo
 //! and QEMU. So the tests do not touch the user's files, a complete set-up lasts a quarter of a second, and a
 //! test can provoke any failure.
@@ -285,7 +285,7 @@ impl Outcome {
     }
 }
 
-/// Not a test: the process that the tests start in their worlds.
+/// Not a test: the process that the tests start in their sandboxes.
 #[test]
 #[ignore = "started by the other tests"]
 fn in_a_sandbox() {
@@ -586,10 +586,10 @@ fn the_message_about_another_version_in_the_archive_names_both_versions() {
         "Rust 1.96.0 is required",
         "--toolchain DIR",
     ]);
-    let asked = fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
+    let log = fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
     assert!(
-        asked.contains("Dir::State::lists"),
-        "newer lists are tried first, in a private folder:\n{asked}"
+        log.contains("Dir::State::lists"),
+        "newer lists are tried first, in a private folder:\n{log}"
     );
 }
 
@@ -634,8 +634,8 @@ echo "host: x86_64-unknown-linux-gnu"; echo "release: 1.96.0"' >$3/usr/bin/rustc
         .succeeded()
         .with_text(&["downloading Rust 1.96.0 as 7 Debian packages"]);
     let apt = || fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
-    let asked = apt();
-    assert!(!asked.contains("update"), "the system's lists do:\n{asked}");
+    let log = apt();
+    assert!(!log.contains("update"), "the system's lists do:\n{log}");
 
     // Without the network and without the archive, which drops old versions: uses the kept packages.
     fs::remove_dir_all(sandbox.cache("toolchain-1.96.0")).unwrap();
@@ -649,7 +649,7 @@ echo "host: x86_64-unknown-linux-gnu"; echo "release: 1.96.0"' >$3/usr/bin/rustc
         )
     };
     offline().succeeded().without_text("downloading");
-    assert_eq!(apt(), asked);
+    assert_eq!(apt(), log);
 
     // Only a damaged package is fetched again.
     let damaged = "lld-22_22_all.deb";
@@ -778,12 +778,12 @@ fn a_missing_qemu_is_unpacked_into_the_cache() {
         "",
         "the QEMU in the cache is used"
     );
-    let asked = || fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
+    let log = || fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
     let downloaded = |line: &&str| line.contains(" download ") && line.contains("libsame");
-    assert_eq!(asked().lines().find(downloaded), None, "the system has it");
+    assert_eq!(log().lines().find(downloaded), None, "the system has it");
     // The installation is planned and downloaded, but not carried out.
     let installs = |line: &&str| line.contains(" install ") && !line.contains("--print-uris");
-    assert_eq!(asked().lines().find(installs), None);
+    assert_eq!(log().lines().find(installs), None);
 
     // QEMU no longer starts, since a library of the system is gone; it is unpacked again.
     write_program(
@@ -829,8 +829,8 @@ fn the_qemu_of_a_debian_suite_does_not_replace_the_systems_qemu() {
         .succeeded()
         .with_text(&["unpacking QEMU", "qemu-sid"]);
     assert_eq!(of("sid").succeeded().text, "");
-    let asked = fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
-    assert!(asked.contains("-t sid"), "{asked}");
+    let log = fs::read_to_string(sandbox.path("home/apt.log")).unwrap();
+    assert!(log.contains("-t sid"), "{log}");
     for other in ["", "../x", "-o", "a b"] {
         of(other).failed(&["not the name of a Debian suite"]);
     }

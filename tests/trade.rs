@@ -11,7 +11,7 @@ fn trade(arguments: &[&str]) -> Output {
         .expect("the program can be started")
 }
 
-/// A debug build would measure its own checks.
+/// Checks that a debug build refuses, because its times would include its checks.
 #[cfg(debug_assertions)]
 #[test]
 fn a_debug_build_refuses_and_says_what_to_do() {

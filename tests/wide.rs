@@ -1,4 +1,4 @@
-//! The wide set, by `cargo wide`: checks the image on each QEMU, in configurations of adapter, chipset,
+//! The wide set, run by `cargo wide`: checks the image on each QEMU, in configurations of adapter, chipset,
 //! memory, CPU and disk.
 //!
 //! `CRYSTAL_BALL_QEMUS` lists the programs, separated as in `PATH`; without it only the installed QEMU is
@@ -88,7 +88,7 @@ fn expected(version: &str, (vga, arguments): &Configuration) -> ExpectedResult {
         ("std", "-machine q35,smm=off") if version.starts_with("10.0.") => ExpectedResult::End(17),
         ("none", "" | "-device bochs-display") => ExpectedResult::End(14),
         (_, "-m 16" | "-cpu qemu32") => ExpectedResult::End(14),
-        // It has no PCI, and so no virtio disk.
+        // This machine has no PCI, and so no virtio disk.
         (_, "-machine isapc") => ExpectedResult::End(15),
         _ => ExpectedResult::Equal,
     }

@@ -1,4 +1,4 @@
-//! The global options, and the model and the machine that subcommands share.
+//! The global options, and how subcommands load the model and boot the VM.
 
 use std::ffi::OsString;
 
@@ -54,7 +54,7 @@ impl Common {
         Ok(model)
     }
 
-    /// Returns the configuration of a machine that boots the image, with a model in the ramdisk if given.
+    /// Returns the configuration of a VM that boots the image, with a model in the ramdisk if given.
     pub fn config(&mut self, ready: &Ready, model: Option<&Model>) -> Config {
         Config {
             vga: std::mem::take(&mut self.vga),

@@ -1,4 +1,4 @@
-//! VGAs that the demo runs on: QEMU's and the emulated VGA.
+//! VGAs that the demo runs on: QEMU's VGA and the emulated VGA.
 //!
 //! Both implement [`Backend`]: they accept the same commands and return the same kinds of evidence, so the
 //! answers of one can be compared with the answers of the other. They share the program (driver and renderer)

@@ -174,7 +174,7 @@ impl<W: Write> Comparison<'_, W> {
     }
 
     /// Compares two files. `differs` is the start of the line that describes a difference; `both` names the
-    /// two files in the message that they cannot be compared.
+    /// two files in the error message.
     fn pair(
         &mut self,
         name: &str,

@@ -21,10 +21,10 @@ use system::quote;
 
 /// The first bytes of every PNG.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
-/// Most bytes to read from a file; a dump of all memory has about half a million. The limit exists because
-/// some files, such as devices, have no end.
+/// The largest number of bytes to read from a file. A dump of all memory has about half a million. The limit
+/// exists because some files, such as devices, have no end.
 const MAX_BYTES: u64 = 1 << 26;
-/// Most pixels of a PNG: a PNG's header may claim more pixels than fit into memory.
+/// The largest number of pixels in a PNG. A PNG's header may claim more pixels than fit into memory.
 const MAX_PIXELS: u64 = 1 << 24;
 
 /// A captured frame: one side of a comparison.
@@ -44,8 +44,8 @@ impl Capture {
     /// Reads a PNG or a dump. The content decides which, not the name.
     ///
     /// # Errors
-    /// A file that cannot be read, or is neither a PNG nor a dump. The error has the file's name, and for a
-    /// damaged dump the line.
+    /// A file that cannot be read, or is neither a PNG nor a dump. The error names the file and, for a
+    /// damaged dump, the line.
     pub fn read(path: &Path) -> anyhow::Result<Self> {
         Self::load(path).with_context(|| quote::path(path))
     }

@@ -1,4 +1,5 @@
-//! Golden frames: committed frames. A change must leave each of them as it is, or bless the new frame.
+//! Golden frames: committed frames. A change to the program must leave each frame as it is, or bless the new
+//! frame.
 //!
 //! A golden is two files of the same name in `tests/golden`. `NAME.toml` is the description:
 //!
@@ -65,7 +66,7 @@ pub struct Golden {
     pub png: PathBuf,
 }
 
-/// A description as it stands in the file.
+/// The description file's fields, unchecked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Description {
@@ -256,20 +257,20 @@ impl Findings {
     ///
     /// # Errors
     /// A failure of a VGA. A fault in the golden is not an error: it is collected.
-    pub fn check_cards(
+    pub fn check_vgas(
         &mut self,
         golden: &Golden,
         emulated: &mut EmulatedDemo<'_>,
-        machine: &mut impl Backend,
+        qemu: &mut impl Backend,
         transfer: Transfer,
     ) -> anyhow::Result<()> {
         emulated.show_with(&golden.options, &golden.show)?;
-        machine.show_with(&golden.options, &golden.show)?;
+        qemu.show_with(&golden.options, &golden.show)?;
         // The kernel has answered and waits for the next command, so it touches no video memory now.
-        let screen = machine.screen()?;
-        let held = self.check_memory(golden, emulated, machine)?;
+        let screen = qemu.screen()?;
+        let held = self.check_memory(golden, emulated, qemu)?;
         if transfer == Transfer::Bytes || !held {
-            self.check_bytes(golden, Content::Page, emulated, machine)?;
+            self.check_bytes(golden, Content::Page, emulated, qemu)?;
         }
         if let Some(difference) = difference(&emulated.screen()?, &screen) {
             self.note(
@@ -279,7 +280,7 @@ impl Findings {
         }
         let [expected, got] = [
             emulated.send(Command::Registers)?,
-            machine.send(Command::Registers)?,
+            qemu.send(Command::Registers)?,
         ];
         for (expected, got) in expected.iter().zip(&got) {
             // QEMU has no PEL Mask.
@@ -299,12 +300,12 @@ impl Findings {
         &mut self,
         golden: &Golden,
         emulated: &mut EmulatedDemo<'_>,
-        machine: &mut impl Backend,
+        qemu: &mut impl Backend,
     ) -> anyhow::Result<bool> {
         // Computed from outside the emulated VGA, so that the program, which both VGAs run, has no part in
         // it.
         let expected = emulated.dump(Content::Memory)?.checksums();
-        let got = machine.send(Command::Checksums(Content::Memory))?;
+        let got = qemu.send(Command::Checksums(Content::Memory))?;
         if got == expected {
             return Ok(true);
         }
@@ -320,7 +321,7 @@ impl Findings {
             ),
         };
         self.note(golden, format!("checksums: {difference}"));
-        self.check_bytes(golden, Content::Memory, emulated, machine)?;
+        self.check_bytes(golden, Content::Memory, emulated, qemu)?;
         Ok(false)
     }
 
@@ -330,10 +331,10 @@ impl Findings {
         golden: &Golden,
         content: Content,
         emulated: &mut EmulatedDemo<'_>,
-        machine: &mut impl Backend,
+        qemu: &mut impl Backend,
     ) -> anyhow::Result<()> {
         let expected = Capture::Dump(emulated.dump(content)?);
-        let got = Capture::Dump(machine.dump(content)?);
+        let got = Capture::Dump(qemu.dump(content)?);
         let what = "expected the emulated VGA's bytes, got QEMU's";
         self.compare(golden, what, &expected, &got);
         Ok(())
@@ -437,11 +438,11 @@ fn difference(expected: &RgbImage, got: &RgbImage) -> Option<String> {
 /// # Errors
 /// A VGA that fails, a difference between QEMU's VGA and the emulated VGA (then no PNG is written), a file
 /// that cannot be written.
-pub fn bless<C: Backend>(
+pub fn bless<B: Backend>(
     folder: &Path,
     report: &Path,
-    boot: impl FnOnce() -> anyhow::Result<C>,
-    leave: impl FnOnce(C) -> anyhow::Result<()>,
+    boot: impl FnOnce() -> anyhow::Result<B>,
+    leave: impl FnOnce(B) -> anyhow::Result<()>,
     mut say: impl FnMut(&str),
 ) -> anyhow::Result<usize> {
     let mut memory = backend::memory();
@@ -474,15 +475,15 @@ pub fn bless<C: Backend>(
         differ.report(report)?;
         say(&format!("report of the changes: {}", report.display()));
     }
-    let mut machine = boot()?;
+    let mut qemu = boot()?;
     let mut disagree = Findings::default();
     let mut step = Progress::counting("asking QEMU", changes.len() as u64);
     for (done, (golden, _)) in (1..).zip(&changes) {
-        disagree.check_cards(golden, &mut emulated, &mut machine, Transfer::Bytes)?;
+        disagree.check_vgas(golden, &mut emulated, &mut qemu, Transfer::Bytes)?;
         step.at(done);
     }
     drop(step);
-    leave(machine)?;
+    leave(qemu)?;
     disagree
         .verdict(&report.with_file_name("disagreement").join("report.html"))
         .context("QEMU's VGA shows other frames, so no golden was changed")?;

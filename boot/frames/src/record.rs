@@ -82,7 +82,7 @@ impl RecordOptions {
     /// A VGA fails or a file cannot be written. The GIF, and each PNG, is either complete or missing.
     pub fn record(
         &self,
-        machine: &mut impl Backend,
+        qemu: &mut impl Backend,
         emulated: &mut EmulatedDemo<'_>,
         options: &FrameOptions,
         mut wrote: impl FnMut(&Path) -> std::io::Result<()>,
@@ -90,13 +90,13 @@ impl RecordOptions {
         let numbers = self.frames.clone().step_by(self.every as usize);
         let what = format_args!("recording into {}", self.out.display());
         let mut step = Progress::counting(what, numbers.clone().count() as u64);
-        machine.show_with(options, &[])?;
+        qemu.show_with(options, &[])?;
         emulated.show_with(options, &[])?;
         let mut frames = (1..).zip(numbers).map(|(done, number)| {
             if interrupted() {
                 return Err(Interrupted.into());
             }
-            let frame = captured(machine, emulated, FrameName::Number(number))?;
+            let frame = captured(qemu, emulated, FrameName::Number(number))?;
             step.at(done);
             Ok((number, frame))
         });
@@ -150,17 +150,17 @@ fn centiseconds(ticks: u64) -> u64 {
 
 /// Shows `frame` on both VGAs, and returns the frame that QEMU's VGA holds.
 fn captured(
-    machine: &mut impl Backend,
+    qemu: &mut impl Backend,
     emulated: &mut EmulatedDemo<'_>,
     frame: FrameName,
 ) -> anyhow::Result<IndexedImage> {
     emulated.send(Command::Show(frame))?;
-    machine.send(Command::Show(frame))?;
+    qemu.send(Command::Show(frame))?;
     let dump = emulated.dump(Content::Page)?;
-    let sums = machine.send(Command::Checksums(Content::Page))?;
+    let sums = qemu.send(Command::Checksums(Content::Page))?;
     Ok(match sums == dump.checksums() {
         true => dump.frame(),
-        false => machine.dump(Content::Page)?.frame(),
+        false => qemu.dump(Content::Page)?.frame(),
     })
 }
 

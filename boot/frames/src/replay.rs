@@ -55,7 +55,7 @@ impl ReplayOptions {
     /// Plays the frames, or writes the sheet and passes its path to `wrote`.
     ///
     /// # Errors
-    /// A file that is neither a dump nor a PNG, with its name; no frame at all; standard output that is not a
+    /// A file that is neither a dump nor a PNG, with its name; no frames; standard output that is not a
     /// terminal, or cannot be written.
     pub fn run(&self, wrote: impl FnOnce(&Path) -> std::io::Result<()>) -> anyhow::Result<()> {
         if self.sheet.is_none() && !stdout().is_terminal() {

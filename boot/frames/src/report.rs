@@ -1,9 +1,9 @@
 //! Writes an HTML report of the differences between frames. The report needs no network.
 //!
-//! Beside `FILE.html` stands a folder `FILE-files`. For each pair that differs it contains the expected
-//! frame, the actual frame and their difference as PNGs, and, if dumps were compared, both dumps. File and
-//! folder can be moved, zipped or uploaded together. Files of an earlier report stay in the folder, but
-//! nothing links to them.
+//! The report `FILE.html` has a folder `FILE-files` beside it. For each pair that differs, the folder
+//! contains the expected frame, the actual frame and their difference as PNGs, and, if dumps were compared,
+//! both dumps. File and folder can be moved, zipped or uploaded together. Files of an earlier report stay in
+//! the folder, but nothing links to them.
 
 use std::collections::HashSet;
 use std::ffi::OsStr;
@@ -33,7 +33,7 @@ const SCRIPT: &str = include_str!("report.js");
 const SCALE: usize = 3;
 /// The width in CSS pixels that narrow frames are scaled up to.
 const WIDTH: usize = SCALE * modex::WIDTH;
-/// Most pixels to list with their values.
+/// The largest number of pixels to list with their values.
 const LISTED: usize = 16;
 /// Longest part of a pair's name that becomes part of its files' names, in characters.
 const MAX_NAME: usize = 80;

@@ -121,7 +121,7 @@ impl DumpOptions {
     /// path of each file.
     ///
     /// # Errors
-    /// The VGA fails or a file cannot be written; the files written before are complete.
+    /// The VGA fails or a file cannot be written. The files written before the error are complete.
     pub fn write(
         &self,
         backend: &mut impl Backend,
@@ -201,7 +201,10 @@ mod tests {
         }
         let shown = demo.dump(Content::Page).unwrap();
         assert_eq!(shown.header.frame, Some(FrameName::Number(9)));
-        let motion = shown.header.motion.expect("it is in reduced quality");
+        let motion = shown
+            .header
+            .motion
+            .expect("the frame is in reduced quality");
         let Motion {
             yaw,
             pitch,

@@ -1,8 +1,8 @@
 //! Protection against files whose import does not end, or makes a library panic.
 //!
-//! The work is done on a separate thread, and nobody has to wait for it, whatever it is doing: reading an
-//! endless pipe, cutting a face, decoding, quantising. The calling thread waits for the result, and watches
-//! for interrupts and for the time limit.
+//! The work runs on a separate thread, which the caller can abandon at any moment: while it reads an endless
+//! pipe, cuts a face, decodes or quantises. The calling thread waits for the result, and watches for
+//! interrupts and for the time limit.
 
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::thread;
@@ -21,7 +21,7 @@ const STACK: usize = 8 << 20;
 /// After an error, the worker's thread may run until the program ends, so the caller should end the program.
 ///
 /// # Errors
-/// Those of the work; [`Interrupted`] if the user stops the program; the time limit; a panic.
+/// The errors of `work`; [`Interrupted`] if the user stops the program; the time limit; a panic.
 pub fn run<T: Send + 'static>(
     name: &str,
     limit: Duration,

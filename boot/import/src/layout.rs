@@ -13,7 +13,7 @@ use image::{Rgb, RgbImage};
 use crate::obj::BadLine;
 use crate::polygon::Polygon;
 
-/// The most times that a face may repeat the texture: then four texels remain for each repetition.
+/// The largest number of times that a face may repeat the texture: four texels remain for each repetition.
 const MAX_REPEATS: f64 = 64.0;
 /// The distance beyond a border of the texture, in textures, up to which a coordinate counts as the border.
 /// Programs write 1.0001, and half a texel is not visible.

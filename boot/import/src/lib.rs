@@ -74,7 +74,7 @@ impl Files {
     /// Makes the model file. Returns `None` if no model is given, even with a texture.
     ///
     /// # Errors
-    /// If a file cannot be used. The message has the file's name, the line if there is one, and the reason.
+    /// If a file cannot be used. The message names the file, the line if one is at fault, and the reason.
     pub fn load(&self) -> anyhow::Result<Option<Model>> {
         match &self.model {
             Some(model) => Model::load(model, self.texture.as_deref()).map(Some),

@@ -39,7 +39,7 @@ pub struct ImportedMesh {
     pub counts: FaceCounts,
 }
 
-/// The side to which a mesh's faces look.
+/// The direction in which a mesh's faces point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Facing {
     /// Some faces face the viewer.
@@ -130,7 +130,7 @@ impl ImportedMesh {
         Ok(mesh)
     }
 
-    /// Returns which way the faces look, to find a file with the opposite winding rule.
+    /// Returns the direction in which the faces point, to detect a file with the opposite winding rule.
     pub fn facing(&self) -> Facing {
         let pose = Pose::at_tick(0);
         let turn = pose.orientation();
@@ -318,7 +318,7 @@ mod tests {
             (0..4).all(|i| found[i] == clockwise[(first + i) % 4]),
             "{found:?}"
         );
-        // The face looks at a viewer in front of the screen.
+        // The face points at a viewer in front of the screen.
         assert_eq!(mesh.faces[0].normal, [0, 0, -16_384]);
     }
 

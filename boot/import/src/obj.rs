@@ -1,7 +1,7 @@
 //! A parser for Wavefront OBJ files: positions, texture coordinates, and faces of any size.
 //!
-//! The project has its own parser because a parser must name the line of every error, and no library does:
-//! tobj's errors have neither line nor value, obj-rs panics at legal statements (`unimplemented!`), and
+//! The project has its own parser because the parser must name the line of every error, and no library does
+//! so: tobj's errors have neither line nor value, obj-rs panics at legal statements (`unimplemented!`), and
 //! wavefront_obj refuses negative indices and cuts every face into a fan. A library would only save the
 //! splitting of lines into words.
 //!
@@ -32,8 +32,8 @@ const MAX_COORDINATE: f64 = 1e30;
 /// room for it twice. To cut a face that visits the same points again and again needs a time that grows with
 /// the cube of its corners: seconds at this limit, 329 s at 16 000.
 pub const MAX_CORNERS: usize = MAX_VERTICES / 2;
-/// The maximum number of faces of a file, and of corners of all its faces. A mesh has room for far fewer,
-/// but the rest may have no area. The limits bound the memory that a file can ask for.
+/// The maximum number of faces of a file, and of corners of all its faces. A mesh has room for far fewer, but
+/// the rest may have no area. The limits bound the memory that a file can claim.
 const MAX_READ: usize = 1 << 20;
 const MAX_READ_CORNERS: usize = 4 * MAX_READ;
 
@@ -478,7 +478,7 @@ impl<'a> Statements<'a> {
     }
 }
 
-/// Returns a line without the `\` at its end, or `None` if it has none there or has a comment.
+/// Returns a line without the `\` at its end, or `None` if the line does not end in `\` or has a comment.
 fn continued(line: &[u8]) -> Option<&[u8]> {
     let blanks = line.iter().rev().take_while(|byte| is_blank(byte)).count();
     let whole = line[..line.len() - blanks].strip_suffix(b"\\")?;

@@ -59,7 +59,7 @@ pub fn read(mut from: impl BufRead + Seek) -> anyhow::Result<OpaqueImage> {
     decoder.set_transformations(Transformations::EXPAND | Transformations::STRIP_16);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    // The size comes first, because decoding allocates the memory that the header asks for.
+    // The size comes first, because decoding allocates the memory that the header claims.
     let header = decoder.read_header_info().map_err(damaged)?;
     let (width, height) = (header.width, header.height);
     ensure!(

@@ -25,10 +25,10 @@ const SERIAL: i32 = child::SOCKETS[1];
 
 /// Returns QEMU's arguments.
 pub fn arguments(config: &Config) -> Vec<OsString> {
-    let mut words: Vec<OsString> = Vec::new();
-    let mut add = |more: &[&str]| words.extend(more.iter().map(OsString::from));
+    let mut arguments: Vec<OsString> = Vec::new();
+    let mut add = |more: &[&str]| arguments.extend(more.iter().map(OsString::from));
     add(&["-name", "Crystal Ball", "-net", "none", "-S"]);
-    // QEMU uses the first `-accel` that works, so this program's must not precede the user's.
+    // QEMU uses the first `-accel` that works, so this program's `-accel` must not precede the user's.
     if !names_accelerator(&config.arguments) {
         add(&["-accel", "tcg"]);
     }
@@ -49,8 +49,8 @@ pub fn arguments(config: &Config) -> Vec<OsString> {
     add(&["-chardev", &serial, "-serial", "chardev:crystal-ball-com1"]);
     let exit = format!("isa-debug-exit,iobase={:#x},iosize=4", Exit::PORT);
     add(&["-device", &exit, "-no-reboot", "-no-shutdown"]);
-    words.extend(config.arguments.iter().cloned());
-    words
+    arguments.extend(config.arguments.iter().cloned());
+    arguments
 }
 
 impl Config {
@@ -138,8 +138,8 @@ mod tests {
     #[test]
     fn the_users_accelerator_replaces_tcg() {
         let uses_tcg = |arguments: &[&str]| {
-            let words = super::arguments(&config(arguments));
-            words.windows(2).any(|pair| pair == ["-accel", "tcg"])
+            let arguments = super::arguments(&config(arguments));
+            arguments.windows(2).any(|pair| pair == ["-accel", "tcg"])
         };
         for named in [
             &["-accel", "kvm"][..],
@@ -168,8 +168,8 @@ mod tests {
 
     #[test]
     fn the_users_arguments_come_last_and_the_images_path_is_escaped() {
-        let words = super::arguments(&config(&["-m", "64"]));
-        assert_eq!(words[words.len() - 2..], ["-m", "64"]);
+        let arguments = super::arguments(&config(&["-m", "64"]));
+        assert_eq!(arguments[arguments.len() - 2..], ["-m", "64"]);
         let line = config(&["-m", "64"]).command_line();
         assert!(line.starts_with("qemu -name 'Crystal Ball' "), "{line}");
         assert!(line.contains("file=a,,b.img "), "{line}");

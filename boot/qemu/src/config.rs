@@ -8,8 +8,8 @@ use setup::Ready;
 
 /// The time limits of a run.
 ///
-/// A limit counts the processor time that QEMU uses. An idle QEMU reaches the limit by wall time, and after
-/// 15 times the limit of wall time the wait ends in any case.
+/// A limit counts the processor time that QEMU uses. An idle QEMU reaches the limit by wall time, and every
+/// wait ends after 15 times the limit in wall time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
     /// From QEMU's start to the kernel's first line.
@@ -51,7 +51,7 @@ pub struct Config {
     pub arguments: Vec<OsString>,
     /// The folder for evidence: each failure gets a new folder in it.
     pub failures: PathBuf,
-    /// How long to wait for the machine.
+    /// The time limits.
     pub limits: Limits,
 }
 

@@ -91,10 +91,10 @@ pub struct Vm {
     run: RunState,
 }
 
-/// The text that QEMU printed when its arguments asked for a list (`-machine help`) and it started no
-/// machine.
+/// The list that QEMU printed instead of starting a machine, because its arguments requested the list
+/// (`-machine help`).
 ///
-/// It is an error, so that it ends the caller's work on the machine, but it is not a failure.
+/// `Printed` is an error type, so that it ends the caller's work, but it is not a [`Failure`].
 #[derive(Debug)]
 pub struct Printed(pub String);
 
@@ -110,7 +110,7 @@ impl Vm {
     /// Starts QEMU and waits for the kernel's first line.
     ///
     /// # Errors
-    /// A [`Failure`] with the verdict; [`Printed`] if QEMU's arguments asked only for a list; the reason if
+    /// A [`Failure`] with the verdict; [`Printed`] if QEMU's arguments only requested a list; the reason if
     /// QEMU could not be started.
     pub fn boot(config: &Config) -> anyhow::Result<Self> {
         Self::boot_through(config, |serial| serial)
@@ -147,7 +147,7 @@ impl Vm {
             log.as_ref().and_then(|log| log.try_clone().ok()),
             send,
         );
-        let mut machine = Self {
+        let mut vm = Self {
             events,
             serial,
             control: Control::new(control),
@@ -163,20 +163,20 @@ impl Vm {
             ending: None,
             run: RunState::default(),
         };
-        machine.run.asked_for_list = config.arguments.iter().any(|word| word == "help");
-        machine.negotiate()?;
-        let mut watchdog = Watchdog::new(machine.process, config.limits.boot);
-        while !machine.run.hello {
-            if !machine.pump_or_wait(&mut watchdog)? {
-                let reset = machine.run.was_reset();
+        vm.run.wants_list = config.arguments.iter().any(|word| word == "help");
+        vm.negotiate()?;
+        let mut watchdog = Watchdog::new(vm.process, config.limits.boot);
+        while !vm.run.hello {
+            if !vm.pump_or_wait(&mut watchdog)? {
+                let reset = vm.run.was_reset();
                 let diagnosis = BootDiagnosis::default();
-                return Err(machine.fail(Verdict::BootLoader { reset, diagnosis }));
+                return Err(vm.fail(Verdict::BootLoader { reset, diagnosis }));
             }
         }
         if let Some(model_file) = config.model_file {
-            machine.wait_for_model(model_file)?;
+            vm.wait_for_model(model_file)?;
         }
-        Ok(machine)
+        Ok(vm)
     }
 
     /// Waits until the kernel has accepted the model file with this checksum.
@@ -295,11 +295,12 @@ impl Vm {
         self.send_raw(&framed)
     }
 
-    /// Returns the lines of the next answer, including the closing line. Errors name the answer by `asked`.
+    /// Returns the lines of the next answer, including the closing line. `request` names the answer in
+    /// errors.
     ///
     /// # Errors
     /// A [`Failure`]; a hang if no answer comes in time.
-    pub fn answer(&mut self, asked: &str) -> anyhow::Result<Vec<String>> {
+    pub fn answer(&mut self, request: &str) -> anyhow::Result<Vec<String>> {
         let mut watchdog = Watchdog::new(self.process, self.limits.answer);
         let mut answer = Vec::new();
         loop {
@@ -315,7 +316,7 @@ impl Vm {
             }
             if !self.pump_or_wait(&mut watchdog)? {
                 return Err(self.fail(Verdict::Hang {
-                    waited_for: format!("the answer to '{asked}'"),
+                    waited_for: format!("the answer to '{request}'"),
                 }));
             }
         }
@@ -378,7 +379,7 @@ impl Vm {
         }
     }
 
-    /// Waits until QEMU ends, for whatever reason.
+    /// Waits until QEMU ends for any reason.
     ///
     /// # Errors
     /// A [`Failure`], unless the kernel left on command.
@@ -502,7 +503,7 @@ impl Vm {
                 let _ = self.control.send("quit", json!({}));
                 self.ending = Some(Watchdog::new(self.process, self.limits.answer));
             }
-            Some(Reaction::AskStatus) => {
+            Some(Reaction::QueryStatus) => {
                 let _ = self.control.send("query-status", json!({}));
             }
             Some(Reaction::Acknowledge) => {
@@ -540,7 +541,7 @@ impl Vm {
         Failure::keep(verdict, &self.evidence, &self.failures).into()
     }
 
-    /// Asks QEMU about the machine: memory, CPU, text screen. An answer that does not come is left empty.
+    /// Queries QEMU for the memory, the CPU and the text screen. A field without an answer stays empty.
     fn examine(&mut self) -> BootDiagnosis {
         let memory = self.request("query-memory-size-summary", json!({}));
         let cpus = self.request("query-cpus-fast", json!({}));
@@ -560,8 +561,7 @@ impl Vm {
         }
     }
 
-    /// Sends a command to QEMU and returns what it replies, or `None` if QEMU ends or does not answer in
-    /// time.
+    /// Sends a command to QEMU and returns the reply, or `None` if QEMU ends or does not answer in time.
     ///
     /// Other events are processed meanwhile and cannot fail this call: it collects evidence for a verdict
     /// that is already certain.
@@ -592,7 +592,7 @@ impl Vm {
     fn keep_screen(&mut self) {
         let bytes = self.request_file("screendump", json!({}));
         let screen = bytes.and_then(|bytes| RgbImage::from_ppm(&bytes).ok());
-        // The first screen, taken when the report came, is the one to look at.
+        // The first screendump, taken when the kernel's report came, is the useful one.
         if self.evidence.screen.is_none() {
             self.evidence.screen = screen;
         }
@@ -647,8 +647,8 @@ impl Backend for Vm {
         }
     }
 
-    /// A malformed dump gives [`Verdict::Garbled`]: the line was garbled in a way that no single line's
-    /// checksum shows.
+    /// Requests a dump. A malformed dump gives [`Verdict::Garbled`]: the serial line was garbled in a way
+    /// that no line's checksum shows.
     fn dump(&mut self, content: Content) -> anyhow::Result<Dump> {
         let lines = self.send(Command::Dump(content))?;
         Dump::from_lines(&lines).map_err(|error| {
@@ -735,7 +735,7 @@ fn read_serial(mut stream: UnixStream, mut log: Option<File>, send: Sender<VmEve
                     Err(_) if !greeted => continue,
                     Err(why) => VmEvent::Garbled(why),
                 };
-                // The machine was dropped. Without this return, a flood of lines would keep the thread busy
+                // The [`Vm`] was dropped. Without this return, a flood of lines would keep the thread busy
                 // for ever.
                 if send.send(event).is_err() {
                     return;

@@ -13,9 +13,9 @@ use serde_json::Value;
 use super::verdict::{BootDiagnosis, Verdict};
 
 /// Run states in which QEMU itself has stopped the machine and that the user does not end. QEMU's other
-/// stopped states are the user's pause, a debugger's stop, and states that pass.
+/// stopped states are the user's pause, a debugger's stop, and temporary states.
 const QEMU_STOPPED: [&str; 4] = ["guest-panicked", "internal-error", "io-error", "watchdog"];
-/// QEMU's events that explain such a state. Their data is kept for the message.
+/// QEMU's events that explain these states. Their data is kept for the message.
 const EXPLAINING_EVENTS: [&str; 4] = [
     "BLOCK_IO_ERROR",
     "GUEST_PANICKED",
@@ -48,7 +48,7 @@ pub enum Reaction {
     /// Send QEMU `quit`: the machine is off, and QEMU may otherwise wait for ever.
     Quit,
     /// Send QEMU `query-status` to find out why the machine has stopped.
-    AskStatus,
+    QueryStatus,
     /// Take the last screendump and acknowledge the kernel's report.
     Acknowledge,
 }
@@ -60,8 +60,8 @@ pub struct RunState {
     pub hello: bool,
     /// The kernel's line about the model file in its ramdisk: accepted or refused.
     pub model_file: Option<String>,
-    /// The user's arguments ask QEMU for a list (`-d help`).
-    pub asked_for_list: bool,
+    /// The user's arguments request a list from QEMU (`-d help`).
+    pub wants_list: bool,
     /// The machine has been started.
     pub started: bool,
     /// The kernel was sent `leave`.
@@ -150,7 +150,7 @@ impl RunState {
                 // With `-no-shutdown` QEMU keeps running when the machine is off, so it needs `quit`. For
                 // some reasons QEMU ends despite the option, as 7.2 does for `isa-debug-exit`. From version
                 // 10 on, `quit` yields the exit code that the kernel wrote to that device. A machine that has
-                // reset itself gets no `quit`: it is judged while it stands still.
+                // reset itself gets no `quit`: it is judged while QEMU keeps it stopped.
                 return (reason != "guest-reset").then_some(Reaction::Quit);
             }
             // The user asked for a power-down in the window's menu or at the monitor. The kernel does not
@@ -160,7 +160,7 @@ impl RunState {
             // A machine that is off sends `STOP` too, but no user has paused it.
             "STOP" if self.shutdown.is_none() => {
                 self.paused.get_or_insert_with(Instant::now);
-                return Some(Reaction::AskStatus);
+                return Some(Reaction::QueryStatus);
             }
             "RESUME" => self.paused = None,
             event if EXPLAINING_EVENTS.contains(&event) => {
@@ -187,7 +187,7 @@ impl RunState {
         }
     }
 
-    /// Keeps the verdict, unless an earlier one is certain already.
+    /// Keeps the verdict, unless an earlier verdict is already certain.
     fn decide(&mut self, verdict: Verdict) {
         self.certain.get_or_insert(verdict);
     }
@@ -205,11 +205,11 @@ impl RunState {
             || (self.ended.is_some() && self.serial_closed && self.control_closed)
     }
 
-    /// Returns QEMU's output if its arguments asked only for a list (`-machine help`): QEMU ended
+    /// Returns QEMU's output if its arguments only requested a list (`-machine help`): QEMU ended
     /// successfully before the machine was started. QEMU 7.2 ends `-d help` with exit code 1.
     pub fn printed(&self) -> Option<String> {
         let code = self.ended.and_then(|status| status.code());
-        let succeeded = code == Some(0) || (code == Some(1) && self.asked_for_list);
+        let succeeded = code == Some(0) || (code == Some(1) && self.wants_list);
         (succeeded && !self.started && !self.output.is_empty())
             .then(|| self.output.join("\n") + "\n")
     }
@@ -382,8 +382,7 @@ mod tests {
         for (events, quits) in [
             (&[HELLO, QUIT, "end 0"][..], true),
             (&[HELLO, SIGNAL, "end 0"], true),
-            // Reset in the window's menu: `-no-reboot` turns it into a shutdown, and the machine stands
-            // still.
+            // Reset in the window's menu: `-no-reboot` turns it into a shutdown, and the machine stops.
             (&[HELLO, SYSTEM_RESET, STOP, QUIT, "end 0"], true),
             (&[HELLO, POWERDOWN, QUIT, "end 0"], true),
             // The window was closed during a pause.
@@ -414,7 +413,7 @@ mod tests {
     fn only_a_users_stop_is_a_pause() {
         let status = |name: &str| format!(r#"qmp {{"return": {{"status": "{name}"}}, "id": 7}}"#);
         let (run, reactions) = played(&[HELLO, STOP]);
-        assert_eq!(reactions, [Reaction::AskStatus]);
+        assert_eq!(reactions, [Reaction::QueryStatus]);
         assert!(run.paused.is_some());
         for name in ["paused", "debug", "save-vm"] {
             let (run, _) = played(&[HELLO, STOP, &status(name)]);
@@ -452,7 +451,7 @@ mod tests {
             assert_eq!(run.printed(), None, "{events:?}");
         }
         let (mut run, _) = played(&["output Log items", "end 1"]);
-        (run.started, run.asked_for_list) = (false, true);
+        (run.started, run.wants_list) = (false, true);
         assert_eq!(run.printed().unwrap(), "Log items\n");
     }
 }

@@ -53,7 +53,7 @@ pub enum Verdict {
     },
     /// The boot loader ended before it reached the kernel.
     BootLoader {
-        /// Whether the machine reset; otherwise nothing happened at all.
+        /// Whether the machine reset; otherwise it stopped without a reset.
         reset: bool,
         /// The properties of the machine that explain the end.
         diagnosis: BootDiagnosis,
@@ -261,7 +261,7 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Writes the evidence into a new folder under `failures`, and returns that folder.
+    /// Writes the evidence into a new folder under `failures`, and returns the new folder's path.
     fn keep(&self, failures: &Path) -> anyhow::Result<PathBuf> {
         std::fs::create_dir_all(failures)?;
         forget_oldest(failures);

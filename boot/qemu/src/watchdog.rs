@@ -1,7 +1,7 @@
 //! Decides when a wait has lasted too long, on a machine that may be busy with other work.
 //!
-//! A limit in wall time fails in two ways. Beside other work a sound boot can need ten times its usual time,
-//! and a limit wide enough for that delays the report of every real hang. QEMU's processor time distinguishes
+//! A limit in wall time fails in two ways. On a busy host, a healthy boot can need ten times its usual time,
+//! and a limit that allows for this delays the report of every real hang. QEMU's processor time distinguishes
 //! three cases. A kernel that spins uses up its limit. A kernel that has stopped, or never started, uses
 //! almost no processor time. A kernel that shares the processor uses what it gets and waits for the rest.
 //! Linux counts that waiting time as well, so a starved QEMU is not mistaken for an idle QEMU.
@@ -74,7 +74,7 @@ impl Watchdog {
 }
 
 /// Returns the processor time that a process has used. It is zero for a process that has ended, and on any
-/// system but Linux, which alone reports it in this way: then wall time decides.
+/// system except Linux, the only system that reports it in this way: then wall time decides.
 fn processor_time(process: Pid) -> Duration {
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", process.as_raw_nonzero()));
     // The second field is the program's name in parentheses, and the name may contain any character.
@@ -117,8 +117,8 @@ mod tests {
         }
     }
 
-    /// Two busy processes for each processor: all of them have to wait. The threads of this process would
-    /// not do: the harness ends threads meanwhile, and a thread that has ended is no longer counted.
+    /// Two busy processes for each processor: all of them have to wait. Threads of this process would not
+    /// work: the test harness ends threads meanwhile, and a thread that has ended is no longer counted.
     #[test]
     fn a_process_without_a_processor_counts_as_starved() {
         let count = 2 * std::thread::available_parallelism().unwrap().get();

@@ -168,8 +168,8 @@ pub fn fetch(
         "downloading the lists of Debian's packages into a temporary folder",
         0,
     );
-    // The exit code of `update` is that of its worst source. It matters only whether the packages are found
-    // afterwards.
+    // The exit code of `update` is that of its worst source. All that matters is whether the packages are
+    // found afterwards.
     let updated = watch(apt.command().args(["--error-on=any", "update"]), step, || 0);
     match (get(&apt), updated) {
         (Err(error), Err(update)) if !error.is::<Interrupted>() && !is_full(&error) => {
@@ -326,8 +326,8 @@ impl<'a> Apt<'a> {
     /// Makes a folder of sources: the system's sources, and this suite of the same archive.
     fn add_source(&self, suite: &str) -> anyhow::Result<()> {
         // apt-get prints the URIs that it would fetch: `'http://HOST/debian/dists/bookworm/InRelease' ...`.
-        let mut ask = self.command();
-        let known = child::run(ask.args(["--print-uris", "update"]))?;
+        let mut update = self.command();
+        let known = child::run(update.args(["--print-uris", "update"]))?;
         let archive = known
             .lines()
             .filter_map(|line| Some(line.strip_prefix('\'')?.split_once("/dists/")?.0))
@@ -386,8 +386,8 @@ impl<'a> Apt<'a> {
             .iter()
             .copied()
             .map(str::to_owned);
-        // Ask about the first package alone. Its name holds no version, so the archive knows it, and `check`
-        // can report its version. With a name whose version the archive lacks, apt-get would list nothing.
+        // Query the first package alone. Its name holds no version, so the archive knows it, and `check` can
+        // report its version. With a name whose version the archive lacks, apt-get would list nothing.
         if let Some(first) = request.without_dependencies.first() {
             let first = [(*first).to_owned()];
             self.uris(cache, &first)?
@@ -425,13 +425,13 @@ impl<'a> Apt<'a> {
         plan.args(["-o", "Dir::State::status=/dev/null"]);
         plan.args(["--no-install-recommends", "-y", "--print-uris", "install"]);
         let plan = child::run(plan.args(request.with_dependencies))?;
-        let mut ask = child::command("dpkg-query");
-        ask.args([
+        let mut query = child::command("dpkg-query");
+        query.args([
             "-W",
             "-f",
             "${db:Status-Status} ${Package}_${Version}_${Architecture}\n",
         ]);
-        let here = child::run(&mut ask)?;
+        let here = child::run(&mut query)?;
         Ok(lacking(&plan, &here, request))
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! A nested cargo needs a separate target folder, because the outer cargo holds the lock of its own target
 //! folder. The user's flags, profiles and wrappers do not reach these builds: see
-//! [settings](super::settings).
+//! [`settings`].
 
 use std::env;
 use std::ffi::OsString;
@@ -195,9 +195,9 @@ pub fn is_intact(place: &Path) -> bool {
 
 /// Makes the image, and returns its path.
 ///
-/// The image is made on every run: that lasts a tenth of a second, and an image with an outdated kernel would
-/// be worse. The name of an image with a ramdisk has the ramdisk's hash, because two runs with different
-/// models may work at the same time.
+/// The image is made on every run: this needs only a tenth of a second, and never leaves an image with an
+/// outdated kernel. The name of an image with a ramdisk has the ramdisk's hash, because two runs with
+/// different models may work at the same time.
 pub fn image(maker: &Path, program: Program, ramdisk: Option<&[u8]>) -> anyhow::Result<PathBuf> {
     let [kernel, mut image] = files(program);
     let [_, folder] = folders();

@@ -1,4 +1,4 @@
-//! The cache folder, which keeps whatever is costly to get, for all of this user's clones.
+//! The cache folder, which keeps costly downloads and builds for all clones of this user.
 //!
 //! A lock file allows one set-up at a time. A new entry is made in a temporary folder in the same file
 //! system, and a rename puts it in place. A killed run leaves at most its temporary folder, which the next
@@ -131,7 +131,7 @@ impl LockedCache {
         Ok(place)
     }
 
-    /// Returns all entries of the cache but the lock file, for which other processes may be waiting.
+    /// Returns all entries of the cache except the lock file, for which other processes may be waiting.
     pub fn contents(&self) -> anyhow::Result<Vec<PathBuf>> {
         let entries = fs::read_dir(self.folder())?.collect::<Result<Vec<_>, _>>()?;
         Ok(entries

@@ -84,7 +84,7 @@ pub fn by_hand() -> String {
     )
 }
 
-/// Returns an error in one line: the error that a program printed, or else the message's first line.
+/// Returns an error as one line: the error that a program printed, or else the message's first line.
 fn reason(error: &anyhow::Error) -> String {
     let text = format!("{error:#}");
     let own = text

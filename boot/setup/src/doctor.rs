@@ -116,7 +116,7 @@ pub fn report(options: &Options, out: &mut impl Write) -> anyhow::Result<bool> {
 
 /// The reason why a part is missing.
 enum Missing {
-    /// The next run adds the part; the text says how.
+    /// The next run adds the part. The text says how.
     NextRun(String),
     /// The user must act. The text says what is wrong, and the command to type.
     ByHand(String),

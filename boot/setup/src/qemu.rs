@@ -19,10 +19,10 @@ use system::{Interrupted, child};
 
 const PROGRAM: &str = "qemu-system-x86_64";
 
-/// The package of QEMU, and the package that adds its window.
+/// The packages to unpack: QEMU, and its window.
 const PACKAGES: [&str; 2] = ["qemu-system-x86", "qemu-system-gui"];
 
-/// A QEMU that starts.
+/// A QEMU that was checked to start.
 #[derive(Debug, Clone)]
 pub struct Qemu {
     /// The program.

@@ -20,10 +20,11 @@ pub fn installed() -> Option<Toolchain> {
     let rustup = which::which("rustup").ok()?;
     // Newer versions of rustup install the toolchain that `which` names, which would change the user's
     // toolchains.
-    let mut ask = child::command(rustup);
-    ask.args(["which", "--toolchain", pin::RUST, "rustc"])
+    let mut command = child::command(rustup);
+    command
+        .args(["which", "--toolchain", pin::RUST, "rustc"])
         .env("RUSTUP_AUTO_INSTALL", "0");
-    let rustc = child::run(&mut ask).ok()?;
+    let rustc = child::run(&mut command).ok()?;
     let folder = Path::new(rustc.trim()).parent()?.parent()?;
     Toolchain::check_pinned(folder).ok()
 }

@@ -1,10 +1,10 @@
 //! The user's cargo settings that reach the nested builds: how to reach the network, and nothing else.
 //!
 //! The kernel and the boot loader run on a bare machine. A `target-cpu`, a linker, a wrapper, a profile or a
-//! target folder that suits the user's programs breaks them. So a nested cargo gets an environment with
-//! known variables only, a private home folder, and a current folder that has no harmful configuration file
-//! in it or above it. (`cargo install`, which the boot loader's build uses, looks for configuration files
-//! from cargo's home upward; `cargo build` looks from the current folder upward.)
+//! target folder that suits the user's programs breaks them. So a nested cargo gets an environment with known
+//! variables only, a private home folder, and a current folder that has no harmful configuration file in it
+//! or above it. (`cargo install`, which the boot loader's build uses, searches for configuration files from
+//! cargo's home upward; `cargo build` searches from the current folder upward.)
 
 use std::env;
 use std::ffi::{OsStr, OsString};

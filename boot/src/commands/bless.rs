@@ -14,7 +14,7 @@ Examples:
   cargo run -- bless                write the changed frames of tests/golden; look at each before you commit
   cargo run -- bless tests/golden   the same, with the folder named";
 
-/// Writes the PNGs of changed goldens, if QEMU agrees.
+/// Writes the PNGs of changed goldens, if QEMU's VGA shows the same frames.
 pub fn run(common: &Common, folder: Option<PathBuf>) -> anyhow::Result<()> {
     let folder = folder.unwrap_or_else(crystal_ball::golden_folder);
     let report = setup::folder().join("bless").join("report.html");

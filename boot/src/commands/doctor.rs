@@ -11,7 +11,7 @@ Examples:
   cargo run -- doctor                                       show what `cargo run` would use
   cargo run -- doctor --qemu /opt/bin/qemu-system-x86_64    check this QEMU";
 
-/// Prints the report. Its exit code is 1 if something is missing that a run cannot get.
+/// Prints the report. The exit code is 1 if something is missing that a run cannot get.
 pub fn run(mut common: Common) -> anyhow::Result<ExitCode> {
     common.options.window = has_display();
     let complete = setup::doctor(&common.options, &mut Output)?;

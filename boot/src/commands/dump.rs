@@ -18,7 +18,7 @@ Examples:
 /// Boots, and writes a dump and a PNG of each frame.
 pub fn run(mut common: Common, frames: &DumpOptions) -> anyhow::Result<()> {
     let model = common.load_to_boot()?;
-    let mut machine = common.boot(model.as_ref())?;
-    frames.write(&mut machine, &common.frame_options, print_path)?;
-    machine.leave()
+    let mut vm = common.boot(model.as_ref())?;
+    frames.write(&mut vm, &common.frame_options, print_path)?;
+    vm.leave()
 }

@@ -21,6 +21,6 @@ pub fn run(common: &Common, frames: &DumpOptions) -> anyhow::Result<()> {
     let model = common.load()?;
     let model_file = model.as_ref().map(Model::file);
     let mut memory = backend::memory();
-    let mut card = EmulatedDemo::with(&mut memory, model_file.as_ref())?;
-    frames.write(&mut card, &common.frame_options, print_path)
+    let mut demo = EmulatedDemo::with(&mut memory, model_file.as_ref())?;
+    frames.write(&mut demo, &common.frame_options, print_path)
 }

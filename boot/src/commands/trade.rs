@@ -18,7 +18,7 @@ Examples:
                                                           two scenes and three mappers
   cargo run --release -- trade --model thing.obj          only your own model";
 
-/// Measures, and writes tables, plots and a page. A debug build gives exit code 2.
+/// Measures, and writes tables, plots and a page. Returns exit code 2 in a debug build.
 pub fn run(common: Common, mut options: TradeOptions) -> anyhow::Result<ExitCode> {
     if let Err(error) = trade::check_build() {
         say(format_args!("error: {error}"));

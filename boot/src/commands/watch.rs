@@ -12,7 +12,7 @@ use system::{say, write_atomically};
 use crate::common::{Common, has_display};
 use crate::output::print_path;
 
-/// The time for which the solid turns before the PNG is written, without a display.
+/// How long the solid turns before the PNG is written, if no window is open.
 const WARM_UP: Duration = Duration::from_secs(1);
 
 /// Boots the image in a window; without a display, or with `--headless`, boots it and writes a PNG.
@@ -41,34 +41,34 @@ pub fn run(mut common: Common) -> anyhow::Result<()> {
     let name = png_name(frame_options, config.model_file);
     let start = Instant::now();
     say(format_args!("booting in QEMU {}", ready.qemu.version));
-    let mut machine = Vm::boot(&Config {
+    let mut vm = Vm::boot(&Config {
         display: display.unwrap_or("none").to_string(),
         ..config
     })?;
-    machine.wait_until_running()?;
+    vm.wait_until_running()?;
     if display.is_some() {
-        // SDL's window gets the size of the VGA's mode when QEMU next reads the screen, which is now.
-        machine.screen()?;
+        // SDL resizes its window to the VGA's mode only when QEMU reads the screen, so read it now.
+        vm.screen()?;
         // If the window cannot be enlarged, it stays as small as QEMU made it.
-        let _ = window::enlarge(machine.process());
+        let _ = window::enlarge(vm.process());
     }
     for command in frame_options.commands() {
-        machine.send(command)?;
+        vm.send(command)?;
     }
     let seconds = start.elapsed().as_secs_f64();
     say(format_args!(
         "the first frame is on the screen {seconds:.1} s after the start"
     ));
     if display.is_some() {
-        machine.send(Command::Steer(None, Change::Act(Action::Hint)))?;
+        vm.send(Command::Steer(None, Change::Act(Action::Hint)))?;
         say("press H in the window to see the keys; close it or press Ctrl-C to end the run");
-        return machine.watch();
+        return vm.watch();
     }
-    machine.rest(WARM_UP)?;
+    vm.rest(WARM_UP)?;
     let png = setup::folder().join(name);
-    let screen = machine.screen()?;
+    let screen = vm.screen()?;
     write_atomically(&png, |file| screen.write_png(file))?;
-    machine.leave()?;
+    vm.leave()?;
     say("a frame of the running demo:");
     Ok(print_path(&png)?)
 }

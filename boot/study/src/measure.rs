@@ -126,7 +126,7 @@ impl KernelRow {
     /// Returns the cost of a piece of work.
     ///
     /// # Panics
-    /// Never: a row has all of [`Work::ALL`].
+    /// Never, because a row has every [`Work::ALL`].
     pub fn cost(&self, work: Work) -> &WorkCost {
         &self.works[&work]
     }
@@ -204,8 +204,8 @@ pub struct TimeRatio {
     pub least: f64,
     /// The largest of the rounds' ratios.
     pub most: f64,
-    /// The ratio of the two shortest times. A disturbance only ever makes a round longer, so on a busy host
-    /// this ratio holds when the median does not.
+    /// The ratio of the two shortest times. A disturbance can only make a round longer, so on a busy host
+    /// this ratio is still valid when the median is not.
     pub undisturbed: f64,
 }
 
@@ -262,7 +262,7 @@ pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
             counted.push(counting.measure(mapper, order, 2, config.spans)?);
             tick();
         }
-        counting.machine.leave()?;
+        counting.vm.leave()?;
         let mut timing = Guest::boot(&ready, cpu, &[])?;
         let mut rows = Vec::new();
         for ((mapper, order), counted) in combinations(config).zip(counted) {
@@ -282,7 +282,7 @@ pub fn run(config: &MeasureConfig) -> anyhow::Result<KernelFigures> {
             });
         }
         let bmi2 = timing.has_bmi2()?;
-        timing.machine.leave()?;
+        timing.vm.leave()?;
         cpus.push(CpuFigures { cpu, bmi2, rows });
     }
     Ok(KernelFigures {
@@ -299,7 +299,7 @@ fn combinations(config: &MeasureConfig) -> impl Iterator<Item = (Mapper, Order)>
 
 /// A machine that runs the benchmark kernel.
 struct Guest {
-    machine: Vm,
+    vm: Vm,
 }
 
 impl Guest {
@@ -307,18 +307,18 @@ impl Guest {
         let arguments = ["-cpu", cpu.name()]
             .into_iter()
             .chain(arguments.iter().copied());
-        let machine = Vm::boot(&qemu::Config {
+        let vm = Vm::boot(&qemu::Config {
             arguments: arguments.map(Into::into).collect(),
             ..qemu::Config::new(ready)
         })?;
-        Ok(Self { machine })
+        Ok(Self { vm })
     }
 
     /// Sends a request, and returns the lines of the answer without its last line.
     fn send(&mut self, request: BenchRequest) -> anyhow::Result<Vec<String>> {
         let request = request.to_string();
-        self.machine.send_line(&request)?;
-        let mut answer = self.machine.answer(&request)?;
+        self.vm.send_line(&request)?;
+        let mut answer = self.vm.answer(&request)?;
         match answer.pop() {
             Some(last) if last == format!("{OK} {request}") => Ok(answer),
             last => bail!(
@@ -334,12 +334,12 @@ impl Guest {
     /// If the clock does not count instructions.
     fn ticks_an_instruction(&mut self) -> anyhow::Result<u64> {
         let answer = self.send(BenchRequest::Calibrate)?;
-        let words: Vec<&str> = answer
+        let fields: Vec<&str> = answer
             .first()
             .map_or("", String::as_str)
             .split(' ')
             .collect();
-        let ["instructions", instructions, "ticks", ticks] = words[..] else {
+        let ["instructions", instructions, "ticks", ticks] = fields[..] else {
             bail!(
                 "the benchmark kernel answered '{}' with {answer:?}; expected 'instructions N ticks N'",
                 BenchRequest::Calibrate
@@ -378,9 +378,9 @@ impl Guest {
     fn figures(&mut self, request: BenchRequest) -> anyhow::Result<BTreeMap<String, Figure>> {
         let answer = self.send(request)?;
         let figures = answer.iter().map(|line| {
-            let mut words = line.split(' ');
-            let name = words.next().unwrap_or_default().to_string();
-            let figure = Figure::parse(words);
+            let mut fields = line.split(' ');
+            let name = fields.next().unwrap_or_default().to_string();
+            let figure = Figure::parse(fields);
             figure.map(|figure| (name, figure)).with_context(|| {
                 format!("the benchmark kernel answered '{request}' with '{line}'; expected figures")
             })

@@ -106,10 +106,10 @@ fn mapper_names() -> impl Iterator<Item = &'static str> {
     Mapper::ALL.iter().map(|named| named.0)
 }
 
-/// Checks that this is a build whose measurements mean something.
+/// Checks that this build gives meaningful measurements.
 ///
 /// # Errors
-/// In a build with debug assertions, which would measure its own checks.
+/// A build with debug assertions, whose times would include the assertions.
 pub fn check_build() -> anyhow::Result<()> {
     ensure!(
         !cfg!(debug_assertions),

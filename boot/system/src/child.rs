@@ -7,8 +7,8 @@
 //! parent-death signal, which a child requests for itself. util-linux's `setpriv` makes the request where it
 //! is installed. Without `setpriv`, children still end with every ordinary end of this program.
 //!
-//! This is by hand, in this module only: a process can set the signal of itself alone, so a crate (`rustix`,
-//! `nix`, `process-wrap`, `command-group`) would still need `CommandExt::pre_exec`, which is unsafe.
+//! No crate replaces `setpriv`: a process can set the signal only for itself, so a crate (`rustix`, `nix`,
+//! `process-wrap`, `command-group`) would still need `CommandExt::pre_exec`, which is unsafe.
 //!
 //! **The signal belongs to the thread** that started the child, not to the process: Linux sends it when that
 //! thread ends. So one thread starts the child and waits for it. [`run`] and [`watch`] return only after the
@@ -91,7 +91,7 @@ fn with_death_signal(signal: &str, script: &str, program: &OsStr) -> Command {
     command
 }
 
-/// What [`watch`] reports about a running child.
+/// An event of a running child, which [`watch`] reports.
 #[derive(Debug, Clone, Copy)]
 pub enum ChildEvent<'a> {
     /// A line of its error output.
@@ -109,7 +109,7 @@ pub fn run(command: &mut Command) -> anyhow::Result<String> {
     watch(command, |_| {})
 }
 
-/// Runs a command as [`run`] does, and reports its error output by line, and the passing of time.
+/// Runs a command as [`run`] does, and reports each line of its error output and the passing of time.
 ///
 /// # Errors
 /// As [`run`].

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Makes Ctrl-C, `SIGTERM` and `SIGHUP` set a flag ([`interrupted`]) in place of ending the program, so that
+/// Makes Ctrl-C, `SIGTERM` and `SIGHUP` set a flag ([`interrupted`]) instead of ending the program, so that
 /// the program can remove its temporary folders. A second signal ends the program at once.
 pub fn catch_interrupts() {
     static ONCE: Once = Once::new();
@@ -21,7 +21,7 @@ pub fn catch_interrupts() {
     });
 }
 
-/// Returns whether the user has asked to stop since [`catch_interrupts`].
+/// Returns whether the user has requested a stop since [`catch_interrupts`].
 pub fn interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }

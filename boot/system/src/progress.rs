@@ -1,7 +1,7 @@
 //! Messages and progress on standard error.
 //!
-//! On a terminal progress is a moving bar; elsewhere, such as in the log of a CI job, it is a line now and
-//! then. Nothing here uses `eprintln!`: libtest captures its output, and a first `cargo test` would be silent
+//! On a terminal progress is a moving bar; elsewhere, such as in the log of a CI job, it is an occasional
+//! line. Nothing here uses `eprintln!`: libtest captures its output, and a first `cargo test` would be silent
 //! for minutes.
 
 use std::fmt::Display;

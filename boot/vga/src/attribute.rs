@@ -91,7 +91,7 @@ impl Attribute {
         Ok(())
     }
 
-    /// The index that goes to the DAC for a pixel: each nibble passes through the palette registers.
+    /// Returns the index that goes to the DAC for a pixel: each nibble passes through the palette registers.
     pub fn colour(&self, pixel: u8) -> u8 {
         let nibble = |n: u8| self.registers[usize::from(n)].unwrap_or(0) & 0x0F;
         nibble(pixel >> 4) << 4 | nibble(pixel & 0x0F)

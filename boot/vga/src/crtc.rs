@@ -141,7 +141,7 @@ impl Crtc {
         Ok(())
     }
 
-    /// The start address in the registers.
+    /// Returns the start address in the registers.
     pub fn start_address(&self) -> Option<u16> {
         let half = |index: u8| self.registers[usize::from(index)];
         Some(u16::from_be_bytes([
@@ -150,13 +150,13 @@ impl Crtc {
         ]))
     }
 
-    /// The start address that was latched last.
+    /// Returns the start address that was latched last.
     pub fn shown_address(&self) -> Option<u16> {
         self.latched
     }
 
-    /// The start addresses of pages that will still be displayed if no further address is written: in the
-    /// current frame, and in the frames after it.
+    /// Returns the start addresses of pages that will still be displayed if no further address is written: in
+    /// the current frame, and in the frames after it.
     pub fn displayed_starts(&self) -> [Option<u16>; 2] {
         let Some(timing) = &self.timing else {
             return [None; 2];
@@ -168,7 +168,7 @@ impl Crtc {
         [old, self.start_address()]
     }
 
-    /// Character clocks since the frame's first line began.
+    /// Returns the character clocks since the frame's first line began.
     fn beam(&self, timing: &Timing) -> usize {
         let latch = self.latch.line(timing) * timing.across.total;
         (latch + timing.frame() - self.ahead) % timing.frame()
@@ -187,7 +187,7 @@ impl Crtc {
         self.latched = self.start_address();
     }
 
-    /// Character clocks until the start address is next latched.
+    /// Returns the character clocks until the start address is next latched.
     pub fn clocks_to_latch(&self) -> Option<usize> {
         self.timing.as_ref().map(|_| self.ahead)
     }
@@ -206,7 +206,7 @@ impl Crtc {
         bit(retrace, VERTICAL_RETRACE) | bit(blank, DISPLAY_DISABLED)
     }
 
-    /// The timing that the registers give.
+    /// Returns the timing that the registers give.
     pub fn timing(&self) -> Result<&Timing, Complaint> {
         self.timing.as_ref().ok_or_else(|| {
             let unknown = self.registers.iter().position(Option::is_none);
@@ -217,7 +217,7 @@ impl Crtc {
 }
 
 impl Latch {
-    /// The scan line at whose start the address is latched, modulo the lines of a frame.
+    /// Returns the scan line at whose start the address is latched, modulo the lines of a frame.
     fn line(self, timing: &Timing) -> usize {
         match self {
             Self::DisplayEnd => timing.down.shown,
@@ -226,7 +226,7 @@ impl Latch {
         }
     }
 
-    /// Character clocks from a position of the beam to the latch: 1 to a whole frame.
+    /// Returns the character clocks from a position of the beam to the latch: 1 to a whole frame.
     fn ahead(self, timing: &Timing, beam: usize) -> usize {
         let (latch, frame) = (self.line(timing) * timing.across.total, timing.frame());
         // A register that changed during the frame may have made the frame shorter.

@@ -78,7 +78,7 @@ impl Dac {
         }
     }
 
-    /// The colour that the monitor gets for an index.
+    /// Returns the colour that the monitor gets for an index.
     pub fn colour(&self, index: u8) -> Result<[u8; 3], Complaint> {
         let Some(mask) = self.pel_mask else {
             return Err(("register was never written", "PEL Mask".into()));
@@ -93,7 +93,7 @@ impl Dac {
     }
 }
 
-/// The entry and part after this one: the entry advances after the third part.
+/// Returns the entry and part after this one: the entry advances after the third part.
 fn next(entry: u8, part: usize) -> (u8, usize) {
     match part {
         2 => (entry.wrapping_add(1), 0),

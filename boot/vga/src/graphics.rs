@@ -42,7 +42,7 @@ impl Graphics {
         }
     }
 
-    /// The plane that a load returns.
+    /// Returns the plane that a load returns.
     pub fn read_map(&self) -> u8 {
         self.registers[4].unwrap_or(0)
     }
@@ -60,7 +60,7 @@ impl Graphics {
         }
     }
 
-    /// Whether GR6 selects graphics; the attribute controller must agree.
+    /// Returns whether GR6 selects graphics; the attribute controller must agree.
     pub fn is_graphics(&self) -> bool {
         self.registers[6].is_some_and(|v| v & 1 == 1)
     }

@@ -16,7 +16,7 @@ pub(crate) struct Memory {
 }
 
 impl Default for Memory {
-    /// Memory contains anything at power-on; this pattern is one that no scene draws.
+    /// Fills memory with a pattern that no scene draws, because memory is undefined at power-on.
     fn default() -> Self {
         Self {
             planes: (0..PLANE_BYTES)

@@ -2,7 +2,7 @@
 //!
 //! The values here are the emulated VGA's own. The registers give times in the chip's units, character clocks
 //! across and scan lines down. [`Timing::of`] computes the times, and [`Timing::faults`] compares them with
-//! those that a VGA monitor needs for 320x240 ([`NEEDED`]).
+//! the times that a VGA monitor needs for 320x240 ([`NEEDED`]).
 //!
 //! Sources: FreeVGA, "CRT Controller Registers" (how registers give times); VESA DMT 1.0, 640x480 at 60 Hz
 //! (what a monitor needs); IBM, "VGA Technical Reference" (which sync polarity stands for which number of
@@ -65,15 +65,15 @@ pub(crate) const NEEDED: Timing = Timing {
     compare: 1023,
 };
 
-/// The first number after `start` whose low `bits` bits equal those of `end`. The chip compares only these
-/// bits, so a period is 1 to 2^`bits` long.
+/// Returns the first number after `start` whose low `bits` bits equal those of `end`. The chip compares only
+/// these bits, so a period is 1 to 2^`bits` long.
 fn end(start: usize, end: usize, bits: u32) -> usize {
     let next = start + 1;
     next + (end.wrapping_sub(next) & ((1 << bits) - 1))
 }
 
 impl Timing {
-    /// The timing that `registers`, CR0 to CR18, give.
+    /// Returns the timing that `registers`, CR0 to CR18, give.
     pub fn of(registers: &[u8; 25]) -> Self {
         let register = |index: usize| usize::from(registers[index]);
         let bit = |index: usize, bit: u32, place: u32| (register(index) >> bit & 1) << place;
@@ -110,12 +110,12 @@ impl Timing {
         }
     }
 
-    /// Character clocks of a frame.
+    /// Returns the character clocks of a frame.
     pub fn frame(&self) -> usize {
         self.across.total * self.down.total
     }
 
-    /// Each time with the registers that give it, and its unit.
+    /// Returns each time with the registers that give it, and its unit.
     fn named(&self) -> [(&'static [u8], &'static str, usize, &'static str); 15] {
         let Self { across, down, .. } = self;
         let (clocks, lines) = ("character clocks", "lines");

@@ -47,13 +47,15 @@ pub struct MonitorImage {
 }
 
 impl DisplayedPage {
-    pub(crate) fn of(card: &DisplayBlocks) -> Result<Self, Complaint> {
-        card.sequencer.check_display()?;
-        card.attribute.check_display(card.graphics.is_graphics())?;
-        let timing = card.crtc.timing()?;
+    pub(crate) fn of(blocks: &DisplayBlocks) -> Result<Self, Complaint> {
+        blocks.sequencer.check_display()?;
+        blocks
+            .attribute
+            .check_display(blocks.graphics.is_graphics())?;
+        let timing = blocks.crtc.timing()?;
         // A pixel in a 256-colour mode is two of the 8 dots of a character wide.
         let (width, height) = (timing.across.shown * 4, timing.down.shown / timing.repeat);
-        let Some(start) = card.crtc.shown_address() else {
+        let Some(start) = blocks.crtc.shown_address() else {
             return Err((
                 "no frame was begun",
                 "the beam has not reached a retrace".into(),
@@ -65,12 +67,12 @@ impl DisplayedPage {
                 let offset = y * timing.stride + x / 4;
                 // The address counter is 16 bits wide: it wraps within the plane.
                 let at = start.wrapping_add(offset as u16);
-                pixels.push(card.attribute.colour(card.memory.peek(x & 3, at)));
+                pixels.push(blocks.attribute.colour(blocks.memory.peek(x & 3, at)));
             }
         }
         let mut palette = [[0; 3]; 256];
         for (index, colour) in (0..=255).zip(&mut palette) {
-            *colour = card.dac.colour(index)?;
+            *colour = blocks.dac.colour(index)?;
         }
         Ok(Self {
             start,

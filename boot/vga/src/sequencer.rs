@@ -52,7 +52,7 @@ impl Sequencer {
         self.registers[usize::from(RESET)] == Some(SYNCHRONOUS_RESET)
     }
 
-    /// The planes that a store reaches: no plane before the first write of Map Mask.
+    /// Returns the planes that a store reaches: no plane before the first write of Map Mask.
     pub fn map_mask(&self) -> u8 {
         self.registers[usize::from(MAP_MASK)].unwrap_or(0)
     }

@@ -163,7 +163,7 @@ impl Vga {
     }
 
     /// Sets a function that returns, for each access, how many character clocks pass before it, in addition
-    /// to the access's own.
+    /// to the access's duration.
     pub fn set_delay(&mut self, delay: impl FnMut(Access) -> usize + 'static) {
         self.delay = Delay(Some(Box::new(delay)));
     }
@@ -183,7 +183,7 @@ impl Vga {
         }
     }
 
-    /// Each access has a duration, and has its effect at the end of it.
+    /// Moves the beam by the duration of an access, and logs the access: it has its effect at its end.
     fn log(&mut self, access: Access) {
         let delay = self.delay.0.as_mut().map_or(0, |delay| delay(access));
         self.crtc.advance(ACCESS_CLOCKS + delay);

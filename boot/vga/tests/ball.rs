@@ -1,4 +1,4 @@
-//! The ball on the emulated card: driver and renderer as they run on the bare machine.
+//! The ball on the emulated VGA: driver and renderer as they run on the bare machine.
 
 use modex::registers::{CRTC, MAP_MASK, MODE_X, SEQUENCER, START_ADDRESS_HIGH};
 use modex::{Counted, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Purpose, WIDTH};
@@ -11,13 +11,13 @@ fn every_frame_equals_the_frame_drawn_in_ram_without_a_fault() {
     let mut texels = Box::new([0; scene::TEXELS]);
     let textures = [scene::paint_ball(&mut texels)];
     let scene = scene::ball(&textures);
-    let mut storage = in_place::boxed!(RenderMemory);
-    let mut stage = SceneRenderer::new(&mut storage, scene);
+    let mut memory = in_place::boxed!(RenderMemory);
+    let mut renderer = SceneRenderer::new(&mut memory, scene);
     let mut card = ModeX::set(Counted::new(Vga::new()), scene.palette).unwrap();
     let mut columns = 0;
     for frame in [0, 1000, u32::MAX, 360, 0] {
         let mut canvas = card.begin(scene.background);
-        let stats = stage
+        let stats = renderer
             .draw(&Pose::at_tick(frame), RenderOptions::default(), &mut canvas)
             .stats;
         columns += u64::from(stats.columns);
@@ -25,7 +25,7 @@ fn every_frame_equals_the_frame_drawn_in_ram_without_a_fault() {
         card.settle();
         let mut page = Box::new(PlanarBuffer::new());
         page.clear(scene.background);
-        stage.draw(&Pose::at_tick(frame), RenderOptions::default(), &mut *page);
+        renderer.draw(&Pose::at_tick(frame), RenderOptions::default(), &mut *page);
         let start = card.shown_page() * PAGE_BYTES;
         let vga = card.bus().inner();
         for (plane, bytes) in page.planes.iter().enumerate() {
@@ -52,7 +52,7 @@ fn every_frame_equals_the_frame_drawn_in_ram_without_a_fault() {
     set.crtc[usize::from(START_ADDRESS_HIGH)] = 0x96;
     set.sequencer[usize::from(MAP_MASK)] = card.registers().sequencer[2];
     assert_eq!(card.registers(), set);
-    // The card's own counts and the bus's.
+    // The emulated VGA's counts equal those of the counting bus.
     let counts = *card.bus().counts();
     let vga = card.bus().inner();
     assert_eq!(

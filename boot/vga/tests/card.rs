@@ -1,15 +1,15 @@
-//! What the card does with accesses that are well.
+//! The effects of legal accesses.
 
 use modex::registers::*;
 use modex::{Bus, HEIGHT, ModeX, Purpose, STRIDE, WIDTH};
 use vga::{Access, Latch, Vga};
 
-/// A colour for each entry, no two alike.
+/// Returns a palette in which all entries differ.
 fn palette() -> [[u8; 3]; 256] {
     std::array::from_fn(|i| [i as u8 & 0x3F, i as u8 >> 6, 63 - (i as u8 >> 2)])
 }
 
-/// A card in Mode X whose page 1 is shown, each line in the colour of its number.
+/// Returns a card in Mode X whose page 1 is shown, each line in the colour of its number.
 fn striped() -> Vga {
     let mut vga = Vga::new();
     let mut card = ModeX::set(&mut vga, &palette()).unwrap();
@@ -73,7 +73,7 @@ fn the_beam_is_where_the_registers_put_it() {
     assert_eq!(beam(&mut vga, 79), frame(2, 0));
     assert_eq!(beam(&mut vga, 80), frame(2, DISPLAY_DISABLED));
     assert_eq!(beam(&mut vga, 99), frame(2, DISPLAY_DISABLED));
-    // No scene uses it: a retrace that ends on the four bits it began with.
+    // No scene uses this case: a retrace whose start and end have the same low four bits.
     vga.out16(CRTC, word(VERTICAL_RETRACE_END, 0x2A));
     vga.take_faults();
     assert_eq!(beam(&mut vga, ACCESS), frame(16, 0));
@@ -123,7 +123,7 @@ fn a_start_address_is_latched_at_the_chosen_moment() {
         assert_eq!(vga.page().unwrap().start, 0x4B00, "{latch:?}");
         vga.pass(1);
         assert_eq!(vga.page().unwrap().start, 0x9600, "{latch:?}");
-        // However much time passes at once, and never before.
+        // The latch happens at that moment, however much time passes at once.
         vga.out16(CRTC, word(START_ADDRESS_HIGH, 0));
         vga.pass(FRAME - ACCESS - 1);
         assert_eq!(vga.page().unwrap().start, 0x9600, "{latch:?}");
@@ -132,7 +132,7 @@ fn a_start_address_is_latched_at_the_chosen_moment() {
     }
 }
 
-/// Until a retrace the CRTC shows from the start address that was there before.
+/// Checks the start address after a mode set: until the next retrace, the CRTC still uses the old one.
 #[test]
 fn a_mode_set_shows_page_0_wherever_the_beam_was() {
     let mut card = ModeX::set(Vga::new(), &palette()).unwrap();
@@ -147,7 +147,8 @@ fn a_mode_set_shows_page_0_wherever_the_beam_was() {
     }
 }
 
-/// No scene uses these values, and they are faults; but the geometry is derived, not assumed.
+/// Checks that the geometry is derived from the registers and not assumed. No scene uses these values, and
+/// they are faults.
 #[test]
 fn the_stride_is_counted_in_bytes_words_or_doublewords() {
     for (index, value, unit) in [(0x17, 0xE3, 1), (0x17, 0xA3, 2), (0x14, 0x40, 4)] {
@@ -164,7 +165,7 @@ fn the_stride_is_counted_in_bytes_words_or_doublewords() {
 #[test]
 fn a_page_wraps_within_the_planes() {
     let mut vga = striped();
-    // A line before the end of the planes: the line after it is page 0's first.
+    // The page starts one line before the end of the planes, so its second line is page 0's first.
     vga.out16(CRTC, word(START_ADDRESS_HIGH, 0xFF));
     vga.out16(CRTC, word(START_ADDRESS_LOW, 0xB0));
     vga.finish_frame();

@@ -1,4 +1,5 @@
-//! Every fault, caused by an access that would blank, garble or be dropped on a card.
+//! Every fault, caused by an access that would blank or garble the screen of a real VGA, or that a real VGA
+//! would drop.
 
 use modex::registers::*;
 use modex::{Bus, Destination, HEIGHT, ModeX, Purpose, STRIDE};
@@ -6,7 +7,7 @@ use vga::Vga;
 
 const BLACK: [[u8; 3]; 256] = [[0; 3]; 256];
 
-/// A card in Mode X, its first frame begun.
+/// Returns a card in Mode X, its first frame begun.
 fn card() -> Vga {
     let mut vga = Vga::new();
     ModeX::set(&mut vga, &BLACK).unwrap();
@@ -19,7 +20,7 @@ fn word(index: u8, value: u8) -> u16 {
     u16::from_le_bytes([index, value])
 }
 
-/// Runs `wrong` on a card in Mode X; it must cause the one fault, by that access.
+/// Runs `wrong` on a card in Mode X; it must cause exactly this fault, by this access.
 #[track_caller]
 fn faults(name: &str, access: &str, wrong: impl FnOnce(&mut Vga)) {
     let mut vga = card();
@@ -224,12 +225,12 @@ fn a_store_is_a_fault_if_the_window_is_not_at_a0000h() {
 #[test]
 fn legal_accesses_that_resemble_faults_are_accepted() {
     let mut vga = card();
-    // A page that is shown may be set up, and drawn on while the screen is off.
+    // A displayed page may be written while the screen is off.
     vga.lane::<STRIDE>(0, 1, |column| column.fill(|| 1));
     vga.out16(SEQUENCER, word(CLOCKING_MODE, 0x21));
     vga.purpose(Purpose::Draw);
     vga.lane::<STRIDE>(0, 1, |column| column.fill(|| 1));
-    // PAS closes the palette registers, and no others.
+    // PAS closes the palette registers and no other registers.
     vga.in8(INPUT_STATUS_1);
     vga.out8(ATTRIBUTE, PALETTE_ADDRESS_SOURCE | 0x10);
     vga.out8(ATTRIBUTE, 0x41);

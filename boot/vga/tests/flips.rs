@@ -20,8 +20,8 @@ fn places() -> impl Iterator<Item = usize> {
         .step_by(LINE)
         .flat_map(|line| [0, 41, 97].map(|clock| line + clock))
 }
-/// Delays: zero, 0.3 ms of a keyboard's handler, the 10 lines between the last line and the retrace,
-/// the retrace, the whole blank, most of a frame, and more than one.
+/// Delays: zero, 0.3 ms of a keyboard's handler, the 10 lines between the last line and the retrace, the
+/// retrace, the whole blank, most of a frame, and more than a frame.
 const DELAYS: [usize; 8] = [
     0,
     9 * LINE,
@@ -33,12 +33,12 @@ const DELAYS: [usize; 8] = [
     FRAME + 20 * LINE,
 ];
 
-/// An index and its data, as a word to an index port.
+/// Returns an index and its data, as a word to an index port.
 fn word(index: u8, value: u8) -> u16 {
     u16::from_le_bytes([index, value])
 }
 
-/// A card in Mode X, and the number of accesses until `delay` passes before one.
+/// Returns a card in Mode X, and the number of accesses until the access that is delayed by `delay`.
 fn card(latch: Latch, delay: Rc<Cell<usize>>) -> (ModeX<Vga>, Rc<Cell<usize>>) {
     let mut card = ModeX::set(Vga::new(), &BLACK).unwrap();
     card.bus().set_latch(latch);
@@ -74,8 +74,8 @@ fn first_store(
     faults.iter().map(ToString::to_string).collect()
 }
 
-/// The order that the driver had: the display is seen, then the address is written, and the retrace
-/// is waited for.
+/// Flips in the order that the driver had before: waits for the display, writes the address, and then waits
+/// for the retrace.
 fn display_then_write(card: &mut ModeX<Vga>) {
     let vga = card.bus();
     vga.purpose(Purpose::Flip);
@@ -91,7 +91,8 @@ fn no_displayed_page_is_drawn_on_whatever_interrupts_the_flip() {
         let (mut card, left) = card(latch, delay.clone());
         for (case, place) in places().enumerate() {
             delay.set(DELAYS[case % DELAYS.len()]);
-            // Before the write, between it and the first status, and in the waits.
+            // Before the address is written, between the write and the first status read, and during the
+            // waits.
             let access = [0, 1, 2, 3, 7, 40, 500][case % 7];
             let faults = first_store(
                 &mut card,
@@ -114,11 +115,11 @@ fn no_displayed_page_is_drawn_on_whatever_interrupts_the_flip() {
     }
 }
 
-/// Shows that the test can fail: it fails with the other order, as the driver's comment says.
+/// Shows that the test can fail: with the other order, which the driver's comment explains, the page tears.
 #[test]
 fn the_other_order_tears_if_an_interrupt_comes_before_the_write() {
-    // The middle of the last line that is shown, as seen from each take-over; the display is seen by
-    // access 0, and the write is access 1.
+    // The beam is in the middle of the last displayed line, counted from the moment of the latch. Access 0
+    // sees the display, and access 1 is the write.
     for (latch, lines) in [(Latch::DisplayEnd, 47), (Latch::RetraceStart, 37)] {
         let place = (lines + 479) * LINE + 40;
         for (interrupt, tears) in [(0, false), (11 * LINE, true)] {
@@ -148,7 +149,7 @@ fn pages_that_are_drawn_and_not_flipped_to_never_reach_the_displayed_page() {
     }
 }
 
-/// Frame after frame, drawn by the driver, with an interrupt of any length before one access in a few.
+/// Lets the driver draw frame after frame, with interrupts of any length before some of the accesses.
 #[test]
 fn the_driver_never_draws_on_a_displayed_page_whatever_interrupts() {
     let mut random = seeded::generator();

@@ -1,12 +1,12 @@
-//! The driver's register table against the card's own values: no bit of the table can be wrong.
+//! The driver's register table against the emulated VGA's own values: every wrong bit is found.
 
 use modex::registers::*;
 use modex::{Bus, Lane, ModeX};
 use vga::{Access, Vga};
 
-/// A card behind a driver whose table has one wrong bit: what the driver writes as the table's value
-/// arrives with that bit changed, and is changed back when it is read.
-struct Mistaken {
+/// An emulated VGA for a driver whose table has one wrong bit. A value of the table arrives with that bit
+/// changed, and a read changes the bit back.
+struct WrongBitVga {
     vga: Vga,
     block: &'static str,
     index: u8,
@@ -29,7 +29,7 @@ const PORTS: [(&str, u16); 4] = [
     ("attribute", ATTRIBUTE),
 ];
 
-impl Mistaken {
+impl WrongBitVga {
     fn write(&mut self, block: &str, index: u8, value: u8) -> u8 {
         if (block, index) != (self.block, self.index) {
             return value;
@@ -46,7 +46,7 @@ impl Mistaken {
     }
 }
 
-impl Bus for Mistaken {
+impl Bus for WrongBitVga {
     fn out8(&mut self, port: u16, value: u8) {
         let data = self.data && port == ATTRIBUTE;
         self.data ^= port == ATTRIBUTE;
@@ -106,13 +106,13 @@ impl Bus for Mistaken {
     }
 }
 
-/// Bits that may be wrong in the table: block, index, bits, and why nobody notices.
+/// Bits that may be wrong in the table: block, index, bits, and why a wrong bit has no effect.
 const FREE: [(&str, u8, u8, &str); 2] = [
     (
         "crtc",
         0x11,
         PROTECT,
-        "the driver clears it before it writes CR0 to CR7, and it guards nothing after that",
+        "the driver clears the bit before it writes CR0 to CR7, and the bit has no effect after that",
     ),
     (
         "graphics",
@@ -125,7 +125,7 @@ const FREE: [(&str, u8, u8, &str); 2] = [
 /// Returns the fault that a mode set with one wrong bit in the table causes, or the page that the monitor
 /// shows instead of page 0.
 fn fault_of(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String> {
-    let mut card = Mistaken {
+    let mut card = WrongBitVga {
         vga: Vga::new(),
         block,
         index,
@@ -137,7 +137,7 @@ fn fault_of(block: &'static str, index: u8, right: u8, bit: u8) -> Option<String
         data: false,
     };
     let set = ModeX::set(&mut card, &[[0; 3]; 256]).map(drop);
-    let Mistaken {
+    let WrongBitVga {
         mut vga, written, ..
     } = card;
     assert!(written, "the driver never wrote this value");

@@ -26,7 +26,7 @@ fn at_every_distance_nothing_is_dropped() {
                     _ => random.i32(0..2 * unit),
                 };
                 let pose = pose(&mut random, distance);
-                solid.on_stage(&mut storage, |stage| {
+                solid.with_renderer(&mut storage, |stage| {
                     let mut page = PlanarBuffer::new();
                     let stats = stage.draw(&pose, RenderOptions::default(), &mut page).stats;
                     assert_eq!(stats.dropped, 0, "{pose:?}");
@@ -182,7 +182,7 @@ fn meshes_that_clipping_has_no_room_for_are_refused() {
         let solid = solid.clone();
         std::panic::catch_unwind(move || {
             let mut storage = in_place::boxed!(RenderMemory);
-            solid.on_stage(&mut storage, |_| ());
+            solid.with_renderer(&mut storage, |_| ());
         })
         .is_ok()
     };

@@ -193,7 +193,7 @@ impl CoverageChecker {
             Scan::Columns => (&area.x, &area.y),
             Scan::Rows => (&area.y, &area.x),
         };
-        // The earliest place where the next span may begin.
+        // The earliest pixel at which the next span may begin.
         let mut free = (lines.start, cells.start);
         let mut wrong = None;
         let sink = |span: Span| {
@@ -239,7 +239,7 @@ impl CoverageChecker {
     }
 }
 
-/// The first pixel in which two sets differ, in the rows of `area`.
+/// Returns the first pixel in which two sets differ, in the rows of `area`.
 fn difference(a: &Pixels, b: &Pixels, area: &Area) -> Option<(i32, i32)> {
     area.y.clone().find_map(|y| {
         let (a, b) = (a.row(y), b.row(y));
@@ -248,7 +248,7 @@ fn difference(a: &Pixels, b: &Pixels, area: &Area) -> Option<(i32, i32)> {
     })
 }
 
-/// The leftmost pixel of a row.
+/// Returns the leftmost pixel of a row.
 fn first(row: &Row) -> Option<i32> {
     let i = row.iter().position(|&word| word != 0)?;
     Some(i as i32 * 64 + row[i].trailing_zeros() as i32)

@@ -12,8 +12,8 @@ pub const WIDTH: i32 = 320;
 /// Rows of the screen.
 pub const HEIGHT: i32 = 240;
 
-/// The definition, word for word: inside when an odd number of edges have `ymin <= yc < ymax` and cross yc at
-/// `x <= xc`.
+/// Returns whether a pixel is inside, word for word by the definition: inside when an odd number of edges
+/// have `ymin <= yc < ymax` and cross yc at `x <= xc`.
 pub fn inside(polygon: &[Point], x: i32, y: i32) -> bool {
     let odd = edges(polygon).filter(|edge| edge.spans(y) && edge.crosses_left_of(x, y));
     odd.count() % 2 == 1
@@ -34,7 +34,7 @@ fn edges(polygon: &[Point]) -> impl Iterator<Item = Edge> {
     })
 }
 
-/// The centre of pixel `i` in 1/256 pixel.
+/// Returns the centre of pixel `i` in 1/256 pixel.
 fn centre(i: i32) -> i64 {
     256 * i64::from(i) + 128
 }
@@ -65,8 +65,8 @@ pub struct Area {
 }
 
 impl Area {
-    /// The pixels of the screen that meet the polygon's bounding box, and the ring of pixels around them. No
-    /// other pixel can be inside.
+    /// Returns the pixels of the screen that meet the polygon's bounding box, and the ring of pixels around
+    /// them. No other pixel can be inside.
     pub fn around(polygon: &[Point]) -> Self {
         let range = |coordinates: &mut dyn Iterator<Item = i32>, limit: i32| {
             let (min, max) = coordinates.fold((i32::MAX, i32::MIN), |(min, max), c| {
@@ -81,7 +81,7 @@ impl Area {
         }
     }
 
-    /// Number of pixels.
+    /// Returns number of pixels.
     pub fn pixels(&self) -> u64 {
         self.x.len() as u64 * self.y.len() as u64
     }
@@ -105,17 +105,17 @@ impl Default for Pixels {
 }
 
 impl Pixels {
-    /// Row `y` of the set.
+    /// Returns row `y` of the set.
     pub fn row(&self, y: i32) -> &Row {
         &self.rows[y as usize]
     }
 
-    /// Row `y` of the set.
+    /// Returns row `y` of the set.
     pub fn row_mut(&mut self, y: i32) -> &mut Row {
         &mut self.rows[y as usize]
     }
 
-    /// Whether the pixel is in the set.
+    /// Returns whether the pixel is in the set.
     pub fn contains(&self, x: i32, y: i32) -> bool {
         self.row(y)[x as usize / 64] >> (x % 64) & 1 == 1
     }

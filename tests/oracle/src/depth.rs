@@ -27,7 +27,8 @@ struct InverseDepth {
 }
 
 impl InverseDepth {
-    /// The inverse depth of a plane through three points within 2^24: n is below 2^63 and d below 2^78.
+    /// Returns the inverse depth of a plane through three points within 2^24: n is below 2^63 and d below
+    /// 2^78.
     fn new(anchors: &[Vec3; 3], x: i32, y: i32) -> Self {
         let [a, b, c] = anchors.map(|point| point.map(i128::from));
         let away = |p: [i128; 3]| [0, 1, 2].map(|k| p[k] - a[k]);
@@ -54,8 +55,8 @@ impl InverseDepth {
         product(self.n, other.d).cmp(&product(other.n, self.d))
     }
 
-    /// Whether the two values differ by less than 2^-40 of the larger: the renderer rounds the normals of
-    /// very large faces.
+    /// Returns whether the two values differ by less than 2^-40 of the larger: the renderer rounds the
+    /// normals of very large faces.
     fn is_close_to(&self, other: &Self) -> bool {
         let (a, b) = (
             self.n as f64 / self.d as f64,
@@ -78,20 +79,21 @@ pub struct DepthCounts {
     pub borders: u64,
 }
 
-/// Compares the visible face at each pixel, and how often each pixel is written when the frame is drawn with `options`.
+/// Compares the visible face at each pixel, and how often each pixel is written when the frame is drawn with
+/// `options`.
 ///
 /// # Errors
 /// A description of the first difference.
 pub fn check(
-    storage: &mut RenderMemory,
+    memory: &mut RenderMemory,
     solid: &Solid,
     pose: &Pose,
     options: RenderOptions,
 ) -> Result<DepthCounts, String> {
     let mut count = PixelCounter::default();
-    solid.on_stage(storage, |stage| {
-        let nearest = sorted(stage, pose);
-        let posed = stage.at(pose);
+    solid.with_renderer(memory, |renderer| {
+        let nearest = sorted(renderer, pose);
+        let posed = renderer.at(pose);
         let visible = posed.visible().expect("the solid is not convex");
         let mut compared = DepthCounts::default();
         let mut found = Vec::new();
@@ -120,7 +122,7 @@ pub fn check(
         let below =
             |i: usize| found[i].is_some() && found.get(i + WIDTH).is_some_and(|b| *b != found[i]);
         compared.borders = (0..found.len()).filter(|&i| below(i)).count() as u64;
-        let stats = count.redraw(stage, pose, options);
+        let stats = count.redraw(renderer, pose, options);
         if u64::from(stats.pixels) != compared.pixels {
             return Err(format!(
                 "{} pixels were written, but faces cover {}",
@@ -140,17 +142,17 @@ pub fn check(
     })
 }
 
-/// The numbers of the front faces that cover each pixel, the nearest first.
-pub fn nearest(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<u16>> {
+/// Returns the numbers of the front faces that cover each pixel, the nearest first.
+pub fn nearest(renderer: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<u16>> {
     let numbers = |faces: Vec<(u16, InverseDepth)>| faces.into_iter().map(|face| face.0).collect();
-    sorted(stage, pose).into_iter().map(numbers).collect()
+    sorted(renderer, pose).into_iter().map(numbers).collect()
 }
 
-/// The faces that cover each pixel, the nearest first.
-fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, InverseDepth)>> {
+/// Returns the faces that cover each pixel, the nearest first.
+fn sorted(renderer: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, InverseDepth)>> {
     let mut at = vec![Vec::new(); WIDTH * HEIGHT];
     let mut covered = Pixels::default();
-    stage.at(pose).faces(|number, face| {
+    renderer.at(pose).faces(|number, face| {
         let Some(Face {
             polygon, anchors, ..
         }) = face
@@ -175,8 +177,8 @@ fn sorted(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Vec<(u16, InverseDe
     at
 }
 
-/// A tube of triangles around a closed curve: `around` rings with `sides` corners each. `ring` returns a
-/// ring's centre and two directions across, all in units.
+/// Returns a tube of triangles around a closed curve: `around` rings with `sides` corners each. `ring`
+/// returns a ring's centre and two directions across, all in units.
 fn tube(around: u16, sides: u16, ring: impl Fn(f64) -> [[f64; 3]; 3]) -> Solid {
     let mut vertices = Vec::new();
     for i in 0..around {
@@ -200,7 +202,7 @@ fn tube(around: u16, sides: u16, ring: impl Fn(f64) -> [[f64; 3]; 3]) -> Solid {
     Solid::new(&vertices, &faces).concave()
 }
 
-/// A torus of a radius and a thickness that lies in x and z, or stands.
+/// Returns a torus of a radius and a thickness that lies in x and z, or stands.
 fn torus(radius: f64, thickness: f64, middle: [f64; 3], stands: bool) -> Solid {
     tube(20, 9, |angle| {
         let (sin, cos) = angle.sin_cos();
@@ -215,7 +217,7 @@ fn torus(radius: f64, thickness: f64, middle: [f64; 3], stands: bool) -> Solid {
     })
 }
 
-/// A tube along a trefoil.
+/// Returns a tube along a trefoil.
 fn knot() -> Solid {
     tube(48, 5, |angle| {
         let at = |t: f64| {
@@ -252,8 +254,8 @@ fn soup(random: &mut Rng, triangles: u16, extent: i32) -> Solid {
     Solid::new(&vertices, &faces).concave()
 }
 
-/// Ten solids that hide parts of themselves in different ways, and the range of distances from which they are
-/// seen.
+/// Returns ten solids that hide parts of themselves in different ways, and the range of distances from which
+/// they are seen.
 pub fn models(random: &mut Rng) -> [(&'static str, Solid, Range<i32>); 10] {
     const UNIT: i32 = 1 << 16;
     let afar = 2 * UNIT..6 * UNIT;

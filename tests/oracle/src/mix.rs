@@ -16,7 +16,7 @@ pub enum PolygonMix {
     Centres,
     /// All vertices on pixel edges, or on pixel corners.
     Borders,
-    /// All sides but the last are horizontal, vertical or diagonal.
+    /// All sides except the last are horizontal, vertical or diagonal.
     Straight,
     /// Two long chains of sides 1/256 pixel apart.
     Slivers,
@@ -64,7 +64,7 @@ impl PolygonMix {
         Self::Meshes,
     ];
 
-    /// The mix's name in the tables.
+    /// Returns the mix's name in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Centres => "vertices on pixel centres",
@@ -85,7 +85,7 @@ impl PolygonMix {
         }
     }
 
-    /// Case `number` of this mix.
+    /// Returns case `number` of this mix.
     pub fn case(self, seed: u64, number: u64) -> CoverageCase {
         let mut draw = PolygonGenerator {
             random: stream(seed, self as u64, number),
@@ -114,12 +114,12 @@ impl PolygonMix {
     }
 }
 
-/// The random numbers of a case. No two kinds of cases use the same `mix`.
+/// Returns the random numbers of a case. No two kinds of cases use the same `mix`.
 pub(crate) fn stream(seed: u64, mix: u64, number: u64) -> Rng {
     Rng::with_seed(scramble(scramble(seed ^ scramble(mix)) ^ number))
 }
 
-/// The finaliser of splitmix64: neighbouring inputs give unrelated outputs.
+/// Returns the finaliser of splitmix64: neighbouring inputs give unrelated outputs.
 fn scramble(number: u64) -> u64 {
     let mut z = number.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -133,7 +133,7 @@ fn point(x: i32, y: i32) -> Point {
     Point { x, y }
 }
 
-/// Twice the area of the triangle; positive if it is clockwise on the screen, y down.
+/// Returns twice the area of the triangle; positive if it is clockwise on the screen, y down.
 fn area(a: Point, b: Point, c: Point) -> i64 {
     let d = |a: i32, b: i32| i64::from(b) - i64::from(a);
     d(a.x, b.x) * d(a.y, c.y) - d(a.x, c.x) * d(a.y, b.y)
@@ -145,7 +145,7 @@ fn polygon_area(polygon: &[Point]) -> i64 {
     sides.map(|(&a, &b)| area(point(0, 0), a, b)).sum()
 }
 
-/// Whether the polygon never turns both ways.
+/// Returns whether the polygon never turns both ways.
 fn is_convex(polygon: &[Point]) -> bool {
     let n = polygon.len();
     let turns = (0..n).map(|i| area(polygon[i], polygon[(i + 1) % n], polygon[(i + 2) % n]));
@@ -161,7 +161,8 @@ fn is_on_screen(p: &Point) -> bool {
     (0..WIDTH * 256).contains(&p.x) && (0..HEIGHT * 256).contains(&p.y)
 }
 
-/// The half turn that contains the direction. The sign of the area orders the directions within a half turn.
+/// Returns the half turn that contains the direction. The sign of the area orders the directions within a
+/// half turn.
 fn half(d: Point) -> bool {
     d.y < 0 || d.y == 0 && d.x < 0
 }
@@ -184,7 +185,7 @@ impl PolygonGenerator {
         self.random.usize(3..=8)
     }
 
-    /// The distance from a polygon's centre to its vertices: a fraction of a pixel to 16 pixels, and
+    /// Returns the distance from a polygon's centre to its vertices: a fraction of a pixel to 16 pixels, and
     /// sometimes beyond the screen.
     fn reach(&mut self) -> i32 {
         let bits = if self.random.u8(..) < 6 {
@@ -195,7 +196,7 @@ impl PolygonGenerator {
         (1 << bits) + self.random.i32(0..1 << bits)
     }
 
-    /// A random grid spacing for positions, in 1/256 pixel.
+    /// Returns a random grid spacing for positions, in 1/256 pixel.
     fn grid(&mut self) -> i32 {
         self.random.choice([1, 1, 16, 64, 128, 128, 256]).unwrap()
     }
@@ -204,7 +205,7 @@ impl PolygonGenerator {
         self.random.i32(-reach..=reach)
     }
 
-    /// A point on the screen or just beyond, at a multiple of `grid`, plus `off`.
+    /// Returns a point on the screen or just beyond, at a multiple of `grid`, plus `off`.
     fn middle(&mut self, grid: i32, off: i32) -> Point {
         let mut place = |pixels: i32| {
             let place = self.random.i32(-8 * 256..(pixels + 8) * 256);
@@ -213,7 +214,7 @@ impl PolygonGenerator {
         point(place(WIDTH), place(HEIGHT))
     }
 
-    /// Vertices around a centre, all at multiples of `grid`, plus `off`.
+    /// Returns vertices around a centre, all at multiples of `grid`, plus `off`.
     fn around(&mut self, sides: usize, grid: i32, off: i32) -> Polygon {
         let reach = self.reach().max(2 * grid);
         let middle = self.middle(grid, off);
@@ -222,7 +223,7 @@ impl PolygonGenerator {
         (0..sides).map(vertex).collect()
     }
 
-    /// Vertices on centres, on edges, or on neither.
+    /// Returns vertices on centres, on edges, or on neither.
     fn anything(&mut self) -> Polygon {
         let (sides, grid) = (self.sides(), self.grid());
         let off = self.random.choice([0, 128]).unwrap();
@@ -313,7 +314,7 @@ impl PolygonGenerator {
             let from = polygon[self.random.usize(..sides)];
             polygon[self.random.usize(..sides)] = from;
         }
-        // Each copy above may have been of a vertex onto itself.
+        // Each copy above may have copied a vertex onto itself.
         polygon[1] = polygon[self.random.choice([0, 2]).unwrap()];
         polygon
     }
@@ -362,8 +363,8 @@ impl PolygonGenerator {
         polygon
     }
 
-    /// Vectors sorted by direction, clockwise on the screen; if there are four or more, each quadrant has at
-    /// least one.
+    /// Returns vectors sorted by direction, clockwise on the screen; if there are four or more, each quadrant
+    /// has at least one.
     fn ring(&mut self, count: usize, grid: i32) -> Polygon {
         let reach = self.reach().max(2 * grid);
         let mut ring = Vec::new();
@@ -427,8 +428,8 @@ impl PolygonGenerator {
         (0..sides).map(vertex).collect()
     }
 
-    /// All triangles turn the same way, and once around in total: so none overlap, and together they are the
-    /// ring.
+    /// Returns a closed fan of triangles. All triangles turn the same way, and once around in total, so no
+    /// two overlap, and together they fill the ring.
     fn fan(&mut self) -> CoverageCase {
         let grid = self.grid();
         let off = self.random.choice([0, 128]).unwrap();
@@ -453,8 +454,8 @@ impl PolygonGenerator {
         }
     }
 
-    /// A lattice whose points move by at most a quarter of its spacing. That turns no triangle over, so none
-    /// overlap, and together they fill the border.
+    /// Returns a lattice whose points move by at most a quarter of its spacing. That turns no triangle over,
+    /// so no two overlap, and together they fill the border.
     fn mesh(&mut self) -> CoverageCase {
         let spacing = self
             .random

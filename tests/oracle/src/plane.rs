@@ -51,7 +51,7 @@ impl PlaneMix {
         Self::BehindEye,
     ];
 
-    /// The mix's name in the tables.
+    /// Returns the mix's name in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Deep => "to 256 units",
@@ -64,7 +64,7 @@ impl PlaneMix {
         }
     }
 
-    /// Case `number` of this mix.
+    /// Returns case `number` of this mix.
     pub fn case(self, seed: u64, number: u64) -> PlaneCase {
         let mut random = stream(seed, 32 + self as u64, number);
         let random = &mut random;
@@ -104,7 +104,7 @@ impl PlaneMix {
     }
 }
 
-/// A side of a texture: powers of two and other numbers, single texels, the largest, any.
+/// Returns a side of a texture: powers of two and other numbers, single texels, the largest, any.
 fn side(random: &mut Rng) -> u16 {
     match random.u8(0..4) {
         0 => random.u16(1..=4),
@@ -113,7 +113,7 @@ fn side(random: &mut Rng) -> u16 {
     }
 }
 
-/// A point on or near the screen, with its z in a random magnitude of `nearest` to `deepest` bits.
+/// Returns a point on or near the screen, with its z in a random magnitude of `nearest` to `deepest` bits.
 pub fn anchor(random: &mut Rng, nearest: u32, deepest: u32, (w, h): (u16, u16)) -> Anchor {
     let bits = random.u32(nearest..deepest);
     let z = random.i32(1 << bits..2 << bits).min(MAX_POSITION);
@@ -167,8 +167,8 @@ impl PlaneCase {
         failing.unwrap_or_else(|| self.clone())
     }
 
-    /// The source of a test with the case, for `kernel/texmap/tests/exact.rs`; `from` says where it was
-    /// found.
+    /// Returns the source of a test with the case, for `kernel/texmap/tests/exact.rs`; `from` says where it
+    /// was found.
     pub fn source(&self, wrong: &PlaneError, from: impl fmt::Display) -> String {
         let Self {
             anchors,
@@ -337,14 +337,14 @@ impl PlaneChecker {
     }
 }
 
-/// A form's value at a pixel's centre.
+/// Returns a form's value at a pixel's centre.
 fn at(form: &Form, x: u16, y: u16) -> i128 {
     let [origin, right, down] = [form.origin, form.right, form.down].map(i128::from);
     origin + right * i128::from(x) + down * i128::from(y)
 }
 
-/// Whether a single shift turns the exact forms into the plane's forms, within [`ROUNDING`], at the upper end
-/// of the first column and at the lower end of the last.
+/// Returns whether a single shift turns the exact forms into the plane's forms, within [`ROUNDING`], at the
+/// upper end of the first column and at the lower end of the last.
 fn is_cut_by_one_shift(case: &PlaneCase, plane: &Plane) -> bool {
     let upper = case.columns.first().map(|&(x, y, _)| (x, y));
     let lower = case.columns.last().map(|&(x, y, len)| (x, y + len - 1));

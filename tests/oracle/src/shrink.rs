@@ -25,7 +25,7 @@ pub fn shrink(checker: &mut CoverageChecker, case: &CoverageCase) -> CoverageCas
     }
 }
 
-/// Legal polygons that are one step simpler; every chain of steps ends.
+/// Returns legal polygons that are one step simpler; every chain of steps ends.
 fn simpler(polygon: &[Point]) -> Vec<Vec<Point>> {
     let mut tries = Vec::new();
     for i in 0..polygon.len() {
@@ -78,7 +78,8 @@ const CHANGES: [fn(i32) -> i32; 11] = [
     |c| c - c.signum() * 4096 * 256,
 ];
 
-/// Fewer vertices first, then rounder coordinates, then smaller coordinates.
+/// Returns the cost of a polygon, which shrinking lowers: fewer vertices first, then rounder coordinates,
+/// then smaller coordinates.
 fn cost(polygon: &[Point]) -> (usize, u32, i64) {
     let coordinates = || polygon.iter().flat_map(|p| [p.x, p.y]);
     let bits = coordinates().map(|c| 8 - c.trailing_zeros().min(8)).sum();
@@ -86,7 +87,8 @@ fn cost(polygon: &[Point]) -> (usize, u32, i64) {
     (polygon.len(), bits, size)
 }
 
-/// The source of a test with the case, for `tests/oracle/tests/coverage.rs`; `from` says where it was found.
+/// Returns the source of a test with the case, for `tests/oracle/tests/coverage.rs`; `from` says where it was
+/// found.
 pub fn source(case: &CoverageCase, wrong: &CoverageError, from: impl Display) -> String {
     let points = |polygon: &[Point]| {
         let point = |p: &Point| format!("({}, {})", p.x, p.y);

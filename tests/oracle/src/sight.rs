@@ -29,8 +29,8 @@ impl RayForm {
         dot(self.across, ray.map(i128::from)) + self.constant
     }
 
-    /// The part of a row's `columns` where the form is at least `least`. Along the row the answer changes
-    /// once, from no to yes or from yes to no; a binary search finds the place.
+    /// Returns the part of a row's `columns` where the form is at least `least`. Along the row the answer
+    /// changes once, from no to yes or from yes to no; a binary search finds the place.
     fn part(&self, y: i32, columns: Range<i32>, least: i128) -> Range<i32> {
         let grows = self.across[0] > 0;
         let Range { mut start, mut end } = columns;
@@ -48,26 +48,26 @@ impl RayForm {
         }
     }
 
-    /// The distance in pixels from a pixel's centre to the line where the form is zero.
+    /// Returns the distance in pixels from a pixel's centre to the line where the form is zero.
     fn distance(&self, x: i32, y: i32) -> f64 {
         let [right, down, _] = self.across.map(|k| 2.0 * k as f64);
         (self.at(x, y) as f64).abs() / right.hypot(down)
     }
 }
 
-/// A flat convex face in front of the eye or beside it, or one that the near plane cuts.
+/// A flat convex face in front of the eye or beside it, or a face that the near plane cuts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ViewFace {
     edges: Vec<RayForm>,
     near: RayForm,
-    /// The volume of the pyramid from the eye to the face, times a constant: above zero if the face looks at
-    /// the eye.
+    /// The volume of the pyramid from the eye to the face, times a constant: above zero if the front of the
+    /// face is seen.
     volume: i128,
 }
 
 impl ViewFace {
-    /// The face with these corners in view space, each coordinate within 2^24: a determinant is below 2^61, a
-    /// volume below 2^75.
+    /// Returns the face with these corners in view space, each coordinate within 2^24: a determinant is below
+    /// 2^61, a volume below 2^75.
     pub fn new(corners: &[Vec3]) -> Self {
         let wide = |i: usize| corners[i % corners.len()].map(i128::from);
         let normals: Vec<_> = (0..corners.len())
@@ -92,13 +92,13 @@ impl ViewFace {
         }
     }
 
-    /// Whether the face looks at the eye.
+    /// Returns whether the eye sees the front of the face.
     pub fn looks_at_eye(&self) -> bool {
         self.volume > 0
     }
 
-    /// Whether moving the corners by `by` may turn the face over, because it is nearly edge-on: compares the
-    /// volume with its largest change, to first order.
+    /// Returns whether moving the corners by `by` may turn the face over, because it is nearly edge-on:
+    /// compares the volume with its largest change, to first order.
     pub fn is_edge_on(&self, by: f64) -> bool {
         let length = |edge: &RayForm| {
             let [x, y, z] = edge.across.map(|k| k as f64);
@@ -107,24 +107,24 @@ impl ViewFace {
         (self.volume as f64).abs() <= by * self.edges.iter().map(length).sum::<f64>()
     }
 
-    /// The pixels of row `y` in `columns` whose centres' lines of sight pass between the edges; and those of
-    /// them that meet the face on the near plane or beyond it.
+    /// Returns the pixels of row `y` in `columns` whose centres' lines of sight pass between the edges, and
+    /// the part of these pixels whose lines meet the face on the near plane or beyond it.
     pub fn row(&self, y: i32, columns: Range<i32>) -> (Range<i32>, Range<i32>) {
         let edges = self.edges.iter();
         let between = edges.fold(columns, |columns, edge| edge.part(y, columns, 1));
         (between.clone(), self.near.part(y, between, 0))
     }
 
-    /// The distance in pixels from a pixel's centre to the line of the nearest edge. The near plane's cut
-    /// counts as an edge.
+    /// Returns the distance in pixels from a pixel's centre to the line of the nearest edge. The near plane's
+    /// cut counts as an edge.
     pub fn distance(&self, x: i32, y: i32) -> f64 {
         let forms = self.edges.iter().chain([&self.near]);
         let distances = forms.map(|form| form.distance(x, y));
         distances.fold(f64::INFINITY, f64::min)
     }
 
-    /// Whether a single edge shows that no line of sight through the screen meets the face. If a linear form
-    /// is nowhere above zero at the corners, it is nowhere above zero between them.
+    /// Returns whether a single edge shows that no line of sight through the screen meets the face. If a
+    /// linear form is nowhere above zero at the corners, it is nowhere above zero between them.
     pub fn is_beside_screen(&self) -> bool {
         let (right, bottom) = (WIDTH as i32 - 1, HEIGHT as i32 - 1);
         let corners = [(0, 0), (right, 0), (0, bottom), (right, bottom)];

@@ -9,7 +9,7 @@ pub const TRIANGLES: u32 = 1 << 24;
 /// a pixel apart (8 x 8 pixels in all) or a quarter (4 x 4).
 pub const STEPS: [i32; 2] = [128, 64];
 
-/// Triangle `number` of the world with this step; it lies within the screen.
+/// Returns triangle `number` of the world with this step; it lies within the screen.
 pub fn triangle(step: i32, number: u32) -> [Point; 3] {
     [16, 8, 0].map(|shift| {
         let place = (number >> shift & 0xFF) as i32;

@@ -34,7 +34,7 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// A solid from its faces, whose vertices are listed clockwise as seen from outside.
+    /// Returns a solid from its faces, whose vertices are listed clockwise as seen from outside.
     pub fn new(vertices: &[Vec3], faces: &[&[u16]]) -> Self {
         let mut solid = Self {
             vertices: vertices.to_vec(),
@@ -59,7 +59,7 @@ impl Solid {
         solid
     }
 
-    /// A box with these half sides: bit k of a vertex is its sign along axis k.
+    /// Returns a box with these half sides: bit k of a vertex is its sign along axis k.
     pub fn cuboid(half: Vec3) -> Self {
         let vertices: Vec<Vec3> = (0..8)
             .map(|i| [0, 1, 2].map(|k| if i >> k & 1 == 1 { half[k] } else { -half[k] }))
@@ -77,7 +77,7 @@ impl Solid {
         )
     }
 
-    /// The unit octahedron. Each of its edges can lie exactly on pixels' centres.
+    /// Returns the unit octahedron. Each of its edges can lie exactly on pixels' centres.
     pub fn octahedron() -> Self {
         let axes = [0, 1, 2].map(|k| [0, 1, 2].map(|i| i32::from(i == k) << 16));
         let vertices: Vec<Vec3> = axes.iter().flat_map(|&a| [a, a.map(|k| -k)]).collect();
@@ -91,7 +91,7 @@ impl Solid {
         Self::new(&vertices, &faces)
     }
 
-    /// The demo's unit ball.
+    /// Returns the demo's unit ball.
     pub fn ball() -> Self {
         let mesh = scene::ball(&[]).mesh;
         let mut solid = Self {
@@ -100,7 +100,7 @@ impl Solid {
             faces: mesh.faces.to_vec(),
             convex: true,
         };
-        // The texture is a different one: coordinates only have to be inside it.
+        // The texture differs from the demo's. Coordinates only have to be inside it.
         for corner in &mut solid.corners {
             corner.u %= i32::from(TEXELS) << 16;
             corner.v %= i32::from(TEXELS) << 16;
@@ -136,7 +136,7 @@ impl Solid {
         self
     }
 
-    /// Its largest coordinate, either sign, 16.16.
+    /// Returns the largest absolute value of a coordinate, 16.16.
     pub fn extent(&self) -> i32 {
         let coordinates = self.vertices.iter().flatten();
         coordinates.map(|k| k.abs()).max().unwrap_or(0)
@@ -149,7 +149,7 @@ impl Solid {
         self
     }
 
-    /// Both solids in one mesh, whose faces may hide each other.
+    /// Joins both solids in one mesh, whose faces may hide each other.
     #[must_use]
     pub fn and(mut self, other: &Self) -> Self {
         let (vertices, corners) = (self.vertices.len() as u16, self.corners.len() as u16);
@@ -166,17 +166,18 @@ impl Solid {
         self.concave()
     }
 
-    /// Calls `act` with a stage that has the solid.
-    pub fn on_stage<T>(
+    /// Calls `act` with a renderer of the solid.
+    pub fn with_renderer<T>(
         &self,
-        storage: &mut RenderMemory,
+        memory: &mut RenderMemory,
         act: impl FnOnce(&mut SceneRenderer<'_>) -> T,
     ) -> T {
         static LIGHT: LightTable = [[1; 256]; LIGHT_LEVELS];
         static PALETTE: Palette = [[0; 3]; 256];
         static BACKGROUND: [u8; HEIGHT] = [0; HEIGHT];
         let texels = [0; TEXELS as usize * TEXELS as usize];
-        let textures = [Texture::new(&texels, TEXELS, TEXELS).expect("as many texels")];
+        let textures =
+            [Texture::new(&texels, TEXELS, TEXELS).expect("the texels fill the texture")];
         let scene = Scene {
             name: "test",
             mesh: Mesh {
@@ -191,10 +192,10 @@ impl Solid {
             background: &BACKGROUND,
             mipmaps: false,
         };
-        act(&mut SceneRenderer::new(storage, scene))
+        act(&mut SceneRenderer::new(memory, scene))
     }
 
-    /// The corners of each face in view space.
+    /// Returns the corners of each face in view space.
     fn views(&self, pose: &Pose) -> impl Iterator<Item = Vec<Vec3>> {
         let orientation = pose.orientation();
         let view = move |corner: &Corner| {
@@ -225,18 +226,18 @@ impl Default for PixelCounter {
 }
 
 impl PixelCounter {
-    /// The number of pixels never written, and of pixels written more than once.
+    /// Returns the number of pixels never written, and of pixels written more than once.
     pub fn gaps_and_doubles(&self) -> (usize, usize) {
         let count = |wrong: fn(u8) -> bool| self.times.iter().filter(|&&n| wrong(n)).count();
         (count(|n| n == 0), count(|n| n > 1))
     }
 
-    /// How often pixel `i` was written. Pixels are numbered along the rows from the upper left.
+    /// Returns how often pixel `i` was written. Pixels are numbered along the rows from the upper left.
     pub fn times(&self, i: usize) -> u8 {
         self.times[i]
     }
 
-    /// The first pixel whose count is wrong, with the count.
+    /// Returns the first pixel whose count is wrong, with the count.
     fn first(&self, mut wrong: impl FnMut(usize, u8) -> bool) -> Option<(i32, i32, u8)> {
         let mut all = self.times.iter().enumerate();
         let (i, &times) = all.find(|&(i, &times)| wrong(i, times))?;
@@ -244,21 +245,21 @@ impl PixelCounter {
     }
 
     /// Clears the counts and draws a solid.
-    pub fn draw(&mut self, storage: &mut RenderMemory, solid: &Solid, pose: &Pose) -> Stats {
-        solid.on_stage(storage, |stage| {
-            self.redraw(stage, pose, RenderOptions::default())
+    pub fn draw(&mut self, memory: &mut RenderMemory, solid: &Solid, pose: &Pose) -> Stats {
+        solid.with_renderer(memory, |renderer| {
+            self.redraw(renderer, pose, RenderOptions::default())
         })
     }
 
-    /// Clears the counts and draws a stage's solid.
+    /// Clears the counts and draws the renderer's solid.
     pub fn redraw(
         &mut self,
-        stage: &mut SceneRenderer<'_>,
+        renderer: &mut SceneRenderer<'_>,
         pose: &Pose,
         options: RenderOptions,
     ) -> Stats {
         self.times.fill(0);
-        stage.draw(pose, options, self).stats
+        renderer.draw(pose, options, self).stats
     }
 }
 
@@ -329,7 +330,8 @@ impl SolidCase {
         }
     }
 
-    /// The source of a test with the case, for `kernel/scene/tests/clips.rs`; `from` says where it was found.
+    /// Returns the source of a test with the case, for `kernel/render/tests/clips.rs`; `from` says where it
+    /// was found.
     pub fn source(&self, wrong: &SolidError, from: impl fmt::Display) -> String {
         let Self { shape, pose, eye } = self;
         let shape = match shape {
@@ -358,7 +360,7 @@ pub enum SolidMix {
     Octahedron,
     /// The ball from inside.
     InBall,
-    /// Boxes from inside, about half of them with the eye as near to a face as it may come.
+    /// Boxes from inside, about half of them with the eye as near to a face as allowed.
     InBox,
     /// Balls and octahedra with vertices at any distance, from inside.
     InCrag,
@@ -379,7 +381,7 @@ impl SolidMix {
         Self::Anywhere,
     ];
 
-    /// The mix's name in the tables.
+    /// Returns the mix's name in the tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::Ball => "ball from outside",
@@ -392,7 +394,7 @@ impl SolidMix {
         }
     }
 
-    /// Case `number` of this mix.
+    /// Returns case `number` of this mix.
     pub fn case(self, seed: u64, number: u64) -> SolidCase {
         let mut random = stream(seed, 64 + self as u64, number);
         let random = &mut random;
@@ -475,8 +477,8 @@ fn from_outside(random: &mut Rng, reach: i32, shape: impl Fn(i32) -> Shape) -> S
     }
 }
 
-/// Random angles at a distance. A fifth of the angles are multiples of an eighth of a turn, where faces are
-/// edge-on or fill the screen.
+/// Returns random angles at a distance. A fifth of the angles are multiples of an eighth of a turn, where
+/// faces are edge-on or fill the screen.
 pub fn pose(random: &mut Rng, distance: i32) -> Pose {
     let mut angle = || {
         if random.u8(0..5) == 0 {
@@ -573,7 +575,7 @@ const SNAPPED: f64 = 1.0 / 128.0;
 /// Checks cases, and owns the memory for the checks.
 #[derive(Debug)]
 pub struct SolidChecker {
-    storage: InPlace<RenderMemory>,
+    memory: InPlace<RenderMemory>,
     front: PixelCounter,
     back: PixelCounter,
     covered: Pixels,
@@ -582,7 +584,7 @@ pub struct SolidChecker {
 impl Default for SolidChecker {
     fn default() -> Self {
         Self {
-            storage: in_place::boxed!(RenderMemory),
+            memory: in_place::boxed!(RenderMemory),
             front: PixelCounter::default(),
             back: PixelCounter::default(),
             covered: Pixels::default(),
@@ -611,7 +613,7 @@ impl SolidChecker {
     }
 
     fn seen_from_inside(&mut self, solid: &Solid, pose: &Pose) -> Result<SolidCounts, SolidError> {
-        let stats = self.front.draw(&mut self.storage, solid, pose);
+        let stats = self.front.draw(&mut self.memory, solid, pose);
         none_dropped(stats)?;
         match self.front.first(|_, times| times != 1) {
             Some((x, y, times)) => Err(SolidError::Times(x, y, times)),
@@ -625,8 +627,8 @@ impl SolidChecker {
 
     fn seen_from_outside(&mut self, solid: &Solid, pose: &Pose) -> Result<SolidCounts, SolidError> {
         let turned = solid.clone().inside_out();
-        let fronts = self.front.draw(&mut self.storage, solid, pose);
-        let backs = self.back.draw(&mut self.storage, &turned, pose);
+        let fronts = self.front.draw(&mut self.memory, solid, pose);
+        let backs = self.back.draw(&mut self.memory, &turned, pose);
         none_dropped(fronts)?;
         none_dropped(backs)?;
         let back = &self.back.times;
@@ -639,7 +641,7 @@ impl SolidChecker {
             let fold = times > 1
                 && [solid, &turned]
                     .into_iter()
-                    .any(|solid| is_in_fold(&mut self.storage, solid, pose, x, y));
+                    .any(|solid| is_in_fold(&mut self.memory, solid, pose, x, y));
             folds += u64::from(fold);
             times > 1 && !fold
         }) {
@@ -660,8 +662,8 @@ impl SolidChecker {
     pub fn by_sight(&mut self, solid: &Solid, pose: &Pose) -> Result<SolidCounts, SolidError> {
         let mut drawn = Vec::new();
         let mut dropped = 0;
-        solid.on_stage(&mut self.storage, |stage| {
-            stage.at(pose).faces(|_, face| match face {
+        solid.with_renderer(&mut self.memory, |renderer| {
+            renderer.at(pose).faces(|_, face| match face {
                 Some(face) => drawn.push((
                     face.anchors.map(|anchor| anchor.position),
                     face.polygon
@@ -741,7 +743,7 @@ impl SolidChecker {
     }
 }
 
-/// The corners of a face that [`texmap::Face`] has as anchors; they identify the face.
+/// Returns the corners of a face that [`texmap::Face`] has as anchors; they identify the face.
 fn anchors(corners: &[Vec3]) -> [Vec3; 3] {
     [0, 1, 2].map(|i| corners[i * corners.len() / 3])
 }
@@ -757,11 +759,11 @@ fn none_dropped(stats: Stats) -> Result<(), SolidError> {
 /// mesh adds a half, [`Solid::stretched`] one and turning a half.
 const ROUNDED: f64 = 2.0 * 1.733;
 
-/// Whether the drawn pixel is covered by a face that rounding may have turned over.
-fn is_in_fold(storage: &mut RenderMemory, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
+/// Returns whether the drawn pixel is covered by a face that rounding may have turned over.
+fn is_in_fold(memory: &mut RenderMemory, solid: &Solid, pose: &Pose, x: i32, y: i32) -> bool {
     let mut covering = Vec::new();
-    solid.on_stage(storage, |stage| {
-        stage.at(pose).faces(|_, drawn| {
+    solid.with_renderer(memory, |renderer| {
+        renderer.at(pose).faces(|_, drawn| {
             let drawn = drawn.into_iter();
             covering.extend(drawn.filter_map(|drawn| {
                 let polygon: Vec<Point> = drawn.polygon.iter().map(|&v| v.into()).collect();

@@ -14,8 +14,9 @@ pub struct Coordinate {
 }
 
 impl Coordinate {
-    /// The texels that may be read if the coordinate is off by at most 2^-`bits` texel (`bits` is at most
-    /// 16), in a texture of `size` texels: one texel, or two neighbours. The last texel owns its far border.
+    /// Returns the texels that may be read if the coordinate is off by at most 2^-`bits` texel (`bits` is at
+    /// most 16), in a texture of `size` texels: one texel, or two neighbours. The last texel owns its far
+    /// border.
     pub fn texels(self, bits: u32, size: u16) -> std::ops::RangeInclusive<u16> {
         let texel = |by: i128| {
             let n = self.n + by * (self.d << (16 - bits));
@@ -88,9 +89,9 @@ pub fn affine(polygon: &[Vertex], x: i32, y: i32) -> Option<[Coordinate; 2]> {
     }))
 }
 
-/// The texel of a perspective coordinate n / c in a texture of `size` texels: the floor of the quotient,
-/// clamped to the texture. On the horizon and beyond it, where c is not above zero, it is the texel that the
-/// quotient tends to before the horizon.
+/// Returns the texel of a perspective coordinate n / c in a texture of `size` texels: the floor of the
+/// quotient, clamped to the texture. On the horizon and beyond it, where c is not above zero, it is the texel
+/// that the quotient tends to before the horizon.
 pub fn perspective(n: i128, c: i128, size: u16) -> u16 {
     let last = i128::from(size) - 1;
     let texel = match (n < 0, c > 0) {
@@ -101,8 +102,9 @@ pub fn perspective(n: i128, c: i128, size: u16) -> u16 {
     texel as u16
 }
 
-/// The three forms of the plane through `anchors` at the centre of a pixel, before quantisation: u = a / c
-/// and v = b / c in texels. The weight of each anchor is the volume of the ray with the other two anchors.
+/// Returns the three forms of the plane through `anchors` at the centre of a pixel, before quantisation: u =
+/// a / c and v = b / c in texels. The weight of each anchor is the volume of the ray with the other two
+/// anchors.
 ///
 /// Positions are within 2^24: a product of two is below 2^49 in each part, a weight below 2^61, a form below
 /// 2^92 (the focal length is at most 2^15).

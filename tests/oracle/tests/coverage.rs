@@ -1,5 +1,5 @@
 //! The renderer's scans against the oracle: a few seconds of the cases that `cargo sweep` runs for a chosen
-//! time. Failures that a sweep finds are pasted in here.
+//! time. Failing cases that a sweep finds are pasted into this file.
 
 use std::fmt::Display;
 
@@ -10,7 +10,7 @@ use oracle::small_world::{STEPS, TRIANGLES, triangle};
 use texmap::scan;
 use texmap::{Dropped, MAX_COORDINATE, MAX_SIDES, Point};
 
-/// Cases of each mix: ten seconds of them.
+/// The number of cases of each mix: about ten seconds in all.
 const CASES: usize = 100_000;
 
 fn polygon(points: &[(i32, i32)]) -> Vec<Point> {
@@ -99,7 +99,7 @@ fn a_polygon_beyond_the_limits_is_dropped_and_gives_no_span() {
     for polygon in [shifted(0, 0), with_sides(MAX_SIDES)] {
         assert!(checker.polygon(&polygon).is_ok());
     }
-    let panics = |run| panic!("{run:?} of a polygon out of range");
+    let panics = |span| panic!("{span:?} of a polygon out of range");
     for (polygon, why) in [
         (shifted(1, 0), Dropped::OutOfRange),
         (shifted(0, 1), Dropped::OutOfRange),

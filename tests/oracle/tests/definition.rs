@@ -1,4 +1,4 @@
-//! Checks the oracle itself against big rationals and against its own definition.
+//! Checks the oracle against big rationals and against its own definition.
 
 use num_bigint::BigInt;
 use num_rational::BigRational;
@@ -9,7 +9,7 @@ use texmap::{MAX_COORDINATE, Point};
 /// Cases for the big numbers.
 const CASES: usize = 100_000;
 
-/// The definition again, in rationals: computes the crossing, and then compares it.
+/// Decides by the definition again, in rationals: computes the crossing, and then compares it.
 fn inside_in_rationals(polygon: &[Point], x: i32, y: i32) -> bool {
     let number = |n: i32, d: i32| BigRational::new(BigInt::from(n), BigInt::from(d));
     let half = number(1, 2);
@@ -27,7 +27,7 @@ fn inside_in_rationals(polygon: &[Point], x: i32, y: i32) -> bool {
     odd
 }
 
-/// Whether the pixel's centre is exactly on a side or a vertex.
+/// Returns whether the pixel's centre is exactly on a side or a vertex.
 fn ties(polygon: &[Point], x: i32, y: i32) -> bool {
     let (xc, yc) = (256 * i128::from(x) + 128, 256 * i128::from(y) + 128);
     (0..polygon.len()).any(|i| {

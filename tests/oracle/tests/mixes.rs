@@ -1,5 +1,5 @@
-//! Checks that each mix has the property that its name states. Whether the mixes find errors shows when a
-//! scan is wrong.
+//! Checks that each mix has the property that its name states. Only a wrong scan can show whether the mixes
+//! find errors.
 
 use oracle::mix::PolygonMix;
 use texmap::{MAX_COORDINATE, MAX_SIDES, Point};
@@ -9,7 +9,7 @@ fn area(a: Point, b: Point, c: Point) -> i64 {
     d(a.x, b.x) * d(a.y, c.y) - d(a.x, c.x) * d(a.y, b.y)
 }
 
-/// Twice the area, cut into triangles from the first vertex.
+/// Returns twice the area, cut into triangles from the first vertex.
 fn signed_area(p: &[Point]) -> i64 {
     p.windows(2).map(|side| area(p[0], side[0], side[1])).sum()
 }
@@ -75,7 +75,7 @@ fn every_polygon_of_a_mix_is_legal_and_has_the_property_in_its_name() {
             let many = matches!(mix, PolygonMix::Fans | PolygonMix::Meshes);
             assert_eq!(case.outline.is_some(), many, "{mix:?} {number}");
             if let Some(outline) = &case.outline {
-                // The areas add up: the polygons fill the outline, and none is turned over.
+                // The areas add up: the polygons fill the outline, and no polygon is turned over.
                 let sum: i64 = case.polygons.iter().map(|p| signed_area(p).abs()).sum();
                 assert_eq!(sum, signed_area(outline).abs(), "{mix:?} {number}");
             }

@@ -91,7 +91,7 @@ fn number(variable: &str) -> Option<u64> {
     number
 }
 
-/// The command that repeats the test of this thread.
+/// Returns the command that repeats the test of this thread.
 fn command(seed: u64) -> String {
     let mut command = format!("{SEED}={seed} ");
     if let Some(cases) = number(CASES) {

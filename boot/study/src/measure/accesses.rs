@@ -1,7 +1,7 @@
 //! The accesses of drawing to video memory and ports, counted on the emulated VGA.
 //!
-//! The benchmark kernel counts nothing while it measures times. So the same work runs here on an emulated
-//! VGA whose accesses are counted. The checksums of the frames prove that both did the same work.
+//! The benchmark kernel counts nothing while it measures times. So the same work runs here on an emulated VGA
+//! that counts the accesses. Equal checksums of the frames prove that both VGAs did the same work.
 
 use anyhow::{bail, ensure};
 use bench::{Bench, BenchMemory, BenchRequest, Clock, Work};

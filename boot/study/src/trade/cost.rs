@@ -1,10 +1,10 @@
 //! The costs of the mappers in RAM, on this CPU.
 //!
 //! Everything is drawn into a planar buffer. Times vary by several per cent from run to run, and with the
-//! load of the machine, so they are reported as ratios of times that were measured by turns. Every
-//! contestant draws in every round, every second round runs backwards, and each ratio is of two times of one
-//! round. A round's time is that of the fastest of several drawings in a row, because a disturbance can only
-//! make a drawing slower.
+//! load of the machine, so they are reported as ratios of times from the same race. Every contestant draws in
+//! every round, every second round runs backwards, and each ratio is of two times of one round. A round's
+//! time is that of the fastest of several drawings in a row, because a disturbance can only make a drawing
+//! slower.
 
 use modex::{Destination, PlanarBuffer};
 use texmap::plane::Anchor;
@@ -18,8 +18,8 @@ use super::workload::{OwnedFace, Workload};
 /// The number of rounds. The reported value is their median.
 pub const ROUNDS: usize = 5;
 
-/// The orders that differ in RAM. [`Order::Buffer`] draws as one of them does, and its presenting costs time
-/// only on a VGA.
+/// The orders that differ in RAM. [`Order::Buffer`] draws like one of these, and presenting costs time only
+/// on a VGA.
 pub const ORDERS: [Order; 2] = [Order::Polygons, Order::Planes];
 
 /// The work that is measured.
@@ -80,8 +80,7 @@ struct Contestant<'a> {
     draw: DrawFn<'a>,
 }
 
-/// Returns the mapper's loop, if this CPU runs it with instructions that not every CPU of its architecture
-/// has.
+/// Returns the mapper's loop, if this CPU runs it with instructions beyond the baseline of its architecture.
 pub fn beyond_baseline(mapper: Mapper) -> Option<Loop> {
     match mapper {
         Mapper::Affine(Loop::Extract) if Loop::Extract.is_tuned_here() => Some(Loop::Extract),
@@ -111,8 +110,8 @@ pub struct MapperCost {
     pub loops: PixelCost,
     /// The cost of the whole frame.
     pub frame: PixelCost,
-    /// The cost of drawing alone with the portable reference, for a loop whose instructions not every CPU
-    /// has.
+    /// The cost of drawing alone with the portable reference, for a loop with instructions beyond the
+    /// baseline.
     pub portable: Option<PixelCost>,
 }
 
@@ -124,9 +123,9 @@ pub struct Effort {
 }
 
 impl Effort {
-    /// The effort for figures.
+    /// The effort for reliable figures.
     pub const FULL: Self = Self { slice: 12_000_000 };
-    /// The effort to see that everything works.
+    /// The effort of a test: enough to run all of the code.
     pub const QUICK: Self = Self { slice: 600_000 };
 }
 
@@ -277,10 +276,10 @@ fn contestants<'a>(
 ) -> Vec<Contestant<'a>> {
     let texels: &[u8; 256] = workload.textures[0].texels()[..256]
         .try_into()
-        .expect("it was cut to 256");
+        .expect("the slice has 256 texels");
     let mut all = Vec::new();
-    let affine = Mapper::parse("affine").expect("it is one of all");
-    let by_rows = Mapper::parse("row-steps").expect("it is one of all");
+    let affine = Mapper::parse("affine").expect("the mapper exists");
+    let by_rows = Mapper::parse("row-steps").expect("the mapper exists");
     for (traversal, mapper) in [
         (Traversal::Columns, affine),
         (Traversal::Rows, by_rows),
@@ -395,7 +394,7 @@ impl Times {
 
     fn cost(&self, mapper: Mapper, order: Order, scope: Scope) -> PixelCost {
         let cost = self.cost_of((Drawer::Mapper(mapper), order, scope), Drawer::bare(mapper));
-        cost.expect("it took part")
+        cost.expect("the contestant took part")
     }
 
     fn cost_of(&self, key: ContestantKey, bare: Drawer) -> Option<PixelCost> {
@@ -405,7 +404,7 @@ impl Times {
             Some(others) => ratio(times, others),
             None => Spread::of(&[f64::NAN]),
         };
-        let packed = Mapper::parse("packed").expect("it is one of all");
+        let packed = Mapper::parse("packed").expect("the mapper exists");
         Some(PixelCost {
             time: Spread::of(times),
             to_bare: to((bare, order, Scope::Loops)),
@@ -422,7 +421,7 @@ pub fn measure(
     effort: Effort,
 ) -> Vec<MapperCost> {
     let mut all = mappers.to_vec();
-    let packed = Mapper::parse("packed").expect("it is one of all");
+    let packed = Mapper::parse("packed").expect("the mapper exists");
     if !all.contains(&packed) {
         all.push(packed);
     }
@@ -500,7 +499,7 @@ pub const ANGLES: [f64; 6] = [0.0, 15.0, 45.0, 60.0, 75.0, 90.0];
 pub const ANGLE: f64 = 30.0;
 /// The length at which angles are swept, in pixels.
 pub const LENGTH: u16 = 240;
-/// Texels a pixel, such that the rotated screen fits into the texture at any angle.
+/// Texels a pixel. With this scale the rotated screen fits into the texture at any angle.
 const SCALE: f64 = 0.63;
 
 /// Returns strips over the whole screen, each `length` pixels high, in one facing plane whose texture is
@@ -549,7 +548,7 @@ pub fn sweep(
     mut done: impl FnMut(),
 ) -> Vec<SweepPoint> {
     let mut all = mappers.to_vec();
-    let packed = Mapper::parse("packed").expect("it is one of all");
+    let packed = Mapper::parse("packed").expect("the mapper exists");
     if !all.contains(&packed) {
         all.push(packed);
     }
@@ -577,10 +576,10 @@ pub fn sweep(
     points
 }
 
-/// Returns the gain from unrolling: the time of a plain loop, relative to that of the same loop unrolled
+/// Returns the gain from unrolling: the time of a plain loop, relative to the time of the same loop unrolled
 /// eight times, on the longest strips, plane by plane.
 pub fn unrolling(workload: &Workload<'_>, effort: Effort) -> Spread {
-    let affine = Mapper::parse("affine").expect("it is one of all");
+    let affine = Mapper::parse("affine").expect("the mapper exists");
     let faces = strips(LENGTH, ANGLE);
     let texels: &[u8; 1 << 16] = workload.textures[0]
         .texels()

@@ -33,7 +33,7 @@ impl TableRow {
     pub fn best(&self) -> &MapperCost {
         let cost = |costs: &&MapperCost| costs.frame.time.median;
         let best = self.costs.iter().min_by(|a, b| cost(a).total_cmp(&cost(b)));
-        best.expect("there is an order")
+        best.expect("the row has costs")
     }
 
     /// Returns the costs in an order.

@@ -54,7 +54,7 @@ impl OwnedFace {
     }
 }
 
-/// A scene at several poses, projected, with its textures lit: what a mapper is measured on.
+/// The input of a measurement: a scene at several poses, projected, with its textures lit.
 #[derive(Debug)]
 pub struct Workload<'a> {
     /// The scene's name.
@@ -75,27 +75,27 @@ impl<'a> Workload<'a> {
     fn new(
         name: &'static str,
         about: String,
-        stage: &'a mut SceneRenderer<'_>,
+        renderer: &'a mut SceneRenderer<'_>,
         poses: &[Pose],
     ) -> Self {
         let mut frames = Vec::new();
         for pose in poses {
             let mut faces = Vec::new();
-            stage
+            renderer
                 .at(pose)
                 .faces(|_, face| faces.extend(face.as_ref().map(OwnedFace::new)));
             frames.push(faces);
         }
-        let stage: &'a SceneRenderer<'_> = stage;
+        let renderer: &'a SceneRenderer<'_> = renderer;
         let numbers = frames.iter().flatten().map(|face| face.texture);
         let most = numbers.max().unwrap_or(0);
         Self {
             name,
             about,
             frames,
-            textures: (0..=most).map(|number| stage.surface(number)).collect(),
-            palette: stage.palette().map(|colour| colour.map(vga::widen)),
-            background: *stage.background(),
+            textures: (0..=most).map(|number| renderer.surface(number)).collect(),
+            palette: renderer.palette().map(|colour| colour.map(vga::widen)),
+            background: *renderer.background(),
         }
     }
 
@@ -117,7 +117,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
         .chain([RANDOM])
 }
 
-/// Makes the workload of a name, and passes it to `measure`. `seed` is the random scene's.
+/// Makes the workload with this name, and passes it to `measure`. `seed` is the seed of the random scene.
 ///
 /// # Panics
 /// If no scene has the name.
@@ -141,19 +141,19 @@ pub fn with_poses<T>(
     measure: impl FnOnce(&Workload<'_>) -> T,
 ) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
-    let mut storage = in_place::boxed!(RenderMemory);
+    let mut memory = in_place::boxed!(RenderMemory);
     let textures = entry.paint(&mut texels);
-    let mut stage = SceneRenderer::new(&mut storage, entry.scene(&textures));
+    let mut renderer = SceneRenderer::new(&mut memory, entry.scene(&textures));
     let about = entry.about.to_string();
-    measure(&Workload::new(entry.name, about, &mut stage, poses))
+    measure(&Workload::new(entry.name, about, &mut renderer, poses))
 }
 
 /// Makes the random workload, with the colours and the texture of the scene `tilted`, and passes it to
 /// `measure`.
 fn with_random<T>(seed: u64, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
     let mut texels = Box::new([0; MAX_TEXELS]);
-    let mut storage = in_place::boxed!(RenderMemory);
-    let entry = Entry::parse("tilted").expect("it is in the catalogue");
+    let mut memory = in_place::boxed!(RenderMemory);
+    let entry = Entry::parse("tilted").expect("the scene is in the catalogue");
     let textures = entry.paint(&mut texels);
     let (vertices, corners, faces) = random_mesh(seed);
     let mesh = Mesh {
@@ -174,8 +174,8 @@ fn with_random<T>(seed: u64, measure: impl FnOnce(&Workload<'_>) -> T) -> T {
         distance: 0,
     };
     let about = format!("{POLYGONS} parallelograms at random, seed {seed}");
-    let mut stage = SceneRenderer::new(&mut storage, scene);
-    measure(&Workload::new(RANDOM, about, &mut stage, &[pose]))
+    let mut renderer = SceneRenderer::new(&mut memory, scene);
+    measure(&Workload::new(RANDOM, about, &mut renderer, &[pose]))
 }
 
 /// Returns parallelograms that face the eye, from near to far, each with the whole texture.
@@ -202,7 +202,8 @@ fn random_mesh(seed: u64) -> (Vec<Vec3>, Vec<Corner>, Vec<MeshFace>) {
         });
         let facing: f64 = (0..3).map(|k| cross[k] * middle[k]).sum();
         let length = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
-        // A parallelogram that faces away is turned over below. One that is seen almost edge-on is left out.
+        // A parallelogram that faces away is turned over below. A parallelogram that is seen almost edge-on
+        // is left out.
         if facing.abs() < 0.02 * length * distance {
             continue;
         }
@@ -260,7 +261,7 @@ mod tests {
         let polygons = |seed| {
             with(RANDOM, seed, |workload| {
                 let faces = &workload.frames[0];
-                // A few are off the screen, but none is lost because it faces away.
+                // A few polygons are off the screen, but no polygon is lost because it faces away.
                 assert!(faces.len() > POLYGONS * 9 / 10, "{}", faces.len());
                 faces
                     .iter()

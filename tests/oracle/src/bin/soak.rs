@@ -107,7 +107,7 @@ fn soak(arguments: &Arguments) -> Result<bool, String> {
     Ok(failures == 0)
 }
 
-/// The runs and failures of all targets.
+/// Returns the runs and failures of all targets.
 fn sum(targets: &[Target]) -> RunCounts {
     let counts = targets.iter().flat_map(|target| target.tests.values());
     counts.fold(RunCounts::default(), |sum, count| RunCounts {
@@ -244,8 +244,8 @@ fn targets() -> Result<Vec<Target>, String> {
     }
 }
 
-/// Whether a target's sources name the crate `seeded`. For a library that is any file of its folder; for a
-/// test, the file and its modules.
+/// Returns whether a target's sources name the crate `seeded`. For a library that is any file of its folder;
+/// for a test, the file and its modules.
 fn names_seeded(source: &Path) -> bool {
     let Some(folder) = source.parent() else {
         return false;

@@ -55,7 +55,7 @@ const ROUND: u64 = 1000;
 /// polygons get about a third of the time each.
 const SOLID_STRIDE: u64 = 50;
 
-/// Results of a mix.
+/// The results of a mix.
 #[derive(Clone, Copy, Default)]
 struct MixResults {
     tried: u64,
@@ -64,7 +64,7 @@ struct MixResults {
     failed: u64,
 }
 
-/// Further results of the solids.
+/// The further results of the solids.
 #[derive(Default)]
 struct SolidTotals {
     /// Pixels seen from outside.
@@ -82,7 +82,7 @@ enum CaseKind {
 }
 
 impl CaseKind {
-    /// All mixes.
+    /// Returns all mixes.
     fn mixes() -> impl Iterator<Item = Self> {
         let polygons = PolygonMix::ALL.map(Self::Polygons);
         let texels = PlaneMix::ALL.map(Self::Texels);
@@ -107,7 +107,7 @@ impl CaseKind {
         }
     }
 
-    /// The case, if this kind consists of polygons.
+    /// Returns the case, if this kind consists of polygons.
     fn polygons(self, seed: u64, number: u64) -> Option<CoverageCase> {
         match self {
             Self::Polygons(mix) => Some(mix.case(seed, number)),
@@ -160,7 +160,7 @@ impl Checkers {
         }
     }
 
-    /// The source of a test with a failed case.
+    /// Returns the source of a test with a failed case.
     fn source(&mut self, kind: CaseKind, seed: u64, number: u64, from: &str) -> String {
         const FAILS: &str = "a case fails again";
         match kind {
