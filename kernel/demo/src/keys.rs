@@ -156,8 +156,8 @@ mod tests {
         let all = codes.len();
         codes.sort();
         codes.dedup();
-        let twins = KEYS.iter().filter(|key| key.codes[0] == key.codes[1]);
-        assert_eq!(codes.len(), all - twins.count());
+        let single = KEYS.iter().filter(|key| key.codes[0] == key.codes[1]);
+        assert_eq!(codes.len(), all - single.count());
         // Every code fits a bit of `Keyboard::down`.
         assert!((KeyCode::Unknown as u8) < 128);
     }

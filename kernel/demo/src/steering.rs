@@ -421,7 +421,7 @@ pub(crate) mod tests {
     /// At any speed, the motion along tiles continues smoothly where the tiles repeat: no interpolated pose
     /// lies behind its neighbours, and no two consecutive poses are a tile apart.
     #[test]
-    fn a_walk_continues_smoothly_where_tiles_repeat() {
+    fn a_motion_continues_smoothly_where_tiles_repeat() {
         let mut state = state_of(0);
         while state.entry().name != "corridor" {
             act(&mut state, 0, Action::NextScene);

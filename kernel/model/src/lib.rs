@@ -623,10 +623,10 @@ mod tests {
         let model_file = ModelFile::parse(&bytes).unwrap();
         let mut arena = in_place::boxed!(Arena);
         let entry = model_file.entry(&mut arena);
-        let mut storage = in_place::boxed!(RenderMemory);
+        let mut memory = in_place::boxed!(RenderMemory);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
         let textures = entry.paint(&mut painted);
-        let mut renderer = SceneRenderer::new(&mut storage, entry.scene(&textures));
+        let mut renderer = SceneRenderer::new(&mut memory, entry.scene(&textures));
         let pose = Pose {
             distance: Pose::MAX_DISTANCE,
             ..entry.pose(77)

@@ -203,7 +203,7 @@ fn position(log: &[Access], access: Access) -> usize {
 }
 
 #[test]
-fn the_mode_is_set_in_an_order_that_every_card_takes() {
+fn the_mode_is_set_in_an_order_that_every_card_accepts() {
     let mut recorder = Recorder::new();
     ModeX::set(&mut recorder, &BLACK).unwrap();
     let log = &recorder.log;
@@ -282,8 +282,8 @@ fn a_register_that_does_not_hold_is_named() {
         recorder.stuck = Some(stuck);
         let error = ModeX::set(&mut recorder, &BLACK).unwrap_err();
         let index = stuck.1;
-        let told = format!("{block} register {index:02X} reads 00 after");
-        assert!(error.to_string().starts_with(&told), "{error}");
+        let expected = format!("{block} register {index:02X} reads 00 after");
+        assert!(error.to_string().starts_with(&expected), "{error}");
     }
 }
 
@@ -442,7 +442,7 @@ fn a_page_that_may_be_on_the_screen_is_not_drawn_on() {
 
 #[test]
 #[should_panic(expected = "the card reports no display in 10000000 reads of Input Status 1, which")]
-fn a_dead_card_is_told_and_not_waited_for() {
+fn a_dead_card_is_reported_and_not_waited_for() {
     let mut recorder = Recorder::new();
     let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
     card.bus().status = vec![0xFF];

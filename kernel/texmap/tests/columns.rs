@@ -1,4 +1,4 @@
-//! The affine mapper's walks: compares their coordinates with the single affine map of a triangle. The oracle
+//! The affine mapper's steppers: compares their coordinates with the single affine map of a triangle. The oracle
 //! checks which pixels they cover (`tests/oracle`).
 
 use std::collections::HashMap;
@@ -7,22 +7,22 @@ use texmap::mappers::affine::{AffineMap, Sides};
 use texmap::scan::{self, Span};
 use texmap::{AffineStepper, Axis, Dropped, Texture, Vertex};
 
-/// Makes the walk down a span.
-type Walker = Box<dyn Fn(&Span) -> AffineStepper>;
-/// Makes a polygon's walker; `None` if the rule does not apply to the polygon.
-type Rule = fn(&[Vertex], &Texture<'_>) -> Option<Walker>;
+/// Makes the stepper down a span.
+type MakeStepper = Box<dyn Fn(&Span) -> AffineStepper>;
+/// Returns the function that makes a polygon's steppers, or `None` if the rule does not apply to the polygon.
+type Rule = fn(&[Vertex], &Texture<'_>) -> Option<MakeStepper>;
 
-fn by_sides(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+fn by_sides(polygon: &[Vertex], texture: &Texture<'_>) -> Option<MakeStepper> {
     let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
     Some(Box::new(move |span| sides.stepper(span)))
 }
 
-fn by_half_steps(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+fn by_half_steps(polygon: &[Vertex], texture: &Texture<'_>) -> Option<MakeStepper> {
     let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
     Some(Box::new(move |span| sides.half_step(span)))
 }
 
-fn by_map(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+fn by_map(polygon: &[Vertex], texture: &Texture<'_>) -> Option<MakeStepper> {
     let map = AffineMap::new(polygon, texture)?;
     Some(Box::new(move |span| map.stepper(span)))
 }
@@ -73,7 +73,7 @@ fn vertex(
 }
 
 #[test]
-fn every_walk_stays_inside_the_texture() {
+fn every_stepper_stays_inside_the_texture() {
     let mut random = seeded::generator();
     let texels = vec![0; 256 * 256];
     let (mut pixels, mut mapped) = (0, 0);

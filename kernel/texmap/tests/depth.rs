@@ -232,8 +232,8 @@ fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64
         Axis::Right => quotient(plane, k, x, y + by),
         Axis::Down => quotient(plane, k, x + by, y),
     };
-    let aside = f64::from(free_direction::LARGEST_DISTANCE) / 16384.0;
-    let [one, other] = [moved(-aside)?, moved(aside)?];
+    let distance = f64::from(free_direction::LARGEST_DISTANCE) / 16384.0;
+    let [one, other] = [moved(-distance)?, moved(distance)?];
     Some((one - here).abs().max((other - here).abs()))
 }
 

@@ -142,7 +142,7 @@ fn a_turned_polygon_gives_the_turned_frame() {
     assert_eq!(others, 0);
 }
 
-/// Steps are rounded towards zero, so a walk in the other direction has the opposite error: at most 2^-8
+/// Steps are rounded towards zero, so a stepper in the other direction has the opposite error: at most 2^-8
 /// texel.
 #[test]
 fn affine_columns_shift_a_texture_by_next_to_nothing() {

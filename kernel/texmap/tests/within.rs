@@ -164,7 +164,7 @@ fn forms(plane: &Plane, axis: Axis, span: &Span<()>) -> PlaneStepper {
     PlaneStepper::along(plane, axis, span.line, span.first)
 }
 
-/// The walk of another walk's pixels from `first` on.
+/// Returns the stepper that starts at pixel `first` of `stepper`.
 fn from(stepper: &PlaneStepper, first: u16) -> PlaneStepper {
     PlaneStepper {
         at: stepper.after(first),

@@ -320,13 +320,13 @@ mod tests {
 
     /// One list may hold jobs of both mappers.
     #[test]
-    fn what_is_lower_is_drawn_by_the_same_loops_and_no_lower_again() {
+    fn a_reduced_mapper_is_drawn_by_the_same_loops_and_is_not_reduced_again() {
         let mut some = 0;
         for (name, mapper, _) in Mapper::ALL {
-            if let Some(lower) = mapper.lower() {
+            if let Some(reduced) = mapper.lower() {
                 some += 1;
-                assert_eq!(lower.style(), mapper.style(), "{name}");
-                assert_eq!(lower.lower(), None, "{name}");
+                assert_eq!(reduced.style(), mapper.style(), "{name}");
+                assert_eq!(reduced.lower(), None, "{name}");
             }
         }
         assert_eq!(Mapper::Exact.lower(), Mapper::parse("linear-16"));

@@ -99,7 +99,7 @@ pub fn truth(n: i64, c: i64, size: u16) -> f64 {
     }
 }
 
-/// The error of the coordinates at pixel `i` of a walk: the larger of the two.
+/// The error of the coordinates at pixel `i` of a span: the larger of the two.
 pub fn off(stepper: &PlaneStepper, i: u16, (u, v): (i32, i32), size: (u16, u16)) -> f64 {
     let [a, b, c] = stepper.after(i);
     let off = |n: i64, at: i32, size: u16| (truth(n, c, size) - f64::from(at)).abs();
