@@ -83,8 +83,8 @@ impl<'a> SceneRenderer<'a> {
     /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices; for a mesh that is not
     /// convex, more than [`MAX_FACES`] faces; more than 16 textures, each mipmap counted; or textures of more
     /// than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`](scene::LIGHT_LEVELS) texels together, each padded to powers
-    /// of two. Also if a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or if a vertex is further
-    /// out than [`MAX_EXTENT`].
+    /// of two. Also if a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or if a vertex is
+    /// further out than [`MAX_EXTENT`].
     pub fn set(&mut self, scene: Scene<'a, '_>) {
         let (vertices, faces) = (scene.mesh.vertices.len(), scene.mesh.faces.len());
         assert!(

@@ -1,5 +1,5 @@
-//! The affine mapper's steppers: compares their coordinates with the single affine map of a triangle. The oracle
-//! checks which pixels they cover (`tests/oracle`).
+//! The affine mapper's steppers: compares their coordinates with the single affine map of a triangle. The
+//! oracle checks which pixels they cover (`tests/oracle`).
 
 use std::collections::HashMap;
 
@@ -35,7 +35,7 @@ fn steppers(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Span,
     steppers
 }
 
-/// Pixels of `polygon`, each with its coordinates; panics on a coordinate outside the texture.
+/// Returns pixels of `polygon`, each with its coordinates; panics on a coordinate outside the texture.
 fn drawn(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> HashMap<(i32, i32), (i32, i32)> {
     let (last_u, last_v) = texture.last();
     let mut pixels = HashMap::new();
@@ -59,7 +59,7 @@ fn vertex(
     snap: i32,
     size: (u16, u16),
 ) -> Vertex {
-    // Multiples of `snap` put vertices on pixel centres and edges on top of each other.
+    // Multiples of `snap` bring vertices onto pixel centres, and edges on top of each other.
     let place = |random: &mut fastrand::Rng, centre: i32| {
         centre + random.i32(-spread..=spread) / snap * snap
     };
@@ -213,8 +213,8 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
     );
 }
 
-/// The limits of the legal range: half of the texture's width to the pixel, a corner as far out as allowed, a
-/// tiny area. One step further no map exists.
+/// The limits of the legal range: half of the texture's width per pixel, a corner as far out as allowed, a
+/// tiny area. One step further out, no map exists.
 #[test]
 fn a_map_holds_at_the_ends_of_its_range() {
     let texels = vec![0; 256 * 256];

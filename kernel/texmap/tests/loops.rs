@@ -22,7 +22,7 @@ fn texels(random: &mut fastrand::Rng, len: usize) -> Vec<u8> {
     (0..len).map(|_| random.u8(UNTOUCHED + 1..)).collect()
 }
 
-/// Room for the texels of any texture.
+/// Returns random texels, enough for any texture.
 fn all_texels(random: &mut fastrand::Rng) -> Vec<u8> {
     texels(random, 256 * 256)
 }
@@ -45,8 +45,8 @@ fn side(random: &mut fastrand::Rng) -> u16 {
     }
 }
 
-/// A start and a step that stay inside `size` texels for `len` pixels. Whole texels, zero fractions, borders
-/// and zero steps are more frequent than by chance.
+/// Returns a start and a step that stay inside `size` texels for `len` pixels. Whole texels, zero fractions,
+/// borders and zero steps are more frequent than by chance.
 fn legal(random: &mut fastrand::Rng, size: u16, len: u16) -> (i32, i32) {
     let last = (i32::from(size) << 16) - 1;
     let mut place = || match random.u8(..6) {
@@ -95,7 +95,7 @@ fn legal_stepper(random: &mut fastrand::Rng, texture: &Texture<'_>, len: u16) ->
     }
 }
 
-/// The texel of pixel `i`, from the definition; coordinates outside wrap around the padded sides.
+/// Returns the texel of pixel `i`, from the definition; coordinates outside wrap around the padded sides.
 fn texel(texture: &Texture<'_>, stepper: AffineStepper, i: usize) -> u8 {
     let at = |at: i32, step: i32| (i64::from(at) + i as i64 * i64::from(step)) >> 16;
     let (column, row) = (at(stepper.u, stepper.du), at(stepper.v, stepper.dv));
@@ -204,7 +204,7 @@ fn a_negative_whole_step_carries_nothing() {
     for pitch in 0..=8 {
         let texture = texture(&texels, (1 << pitch, 256), true);
         for (du, dv) in [(0, -1), (-1, 0), (-1, -1), (1, -1), (-1, 1)] {
-            // As many pixels as the texture has room for.
+            // The number of pixels that fit in the texture.
             let room = |step: i32, size: u16| if step == 0 { 240 } else { size.min(240) };
             let len = room(du, texture.width()).min(room(dv, texture.height()));
             let mut start = |step: i32, size: u16| {

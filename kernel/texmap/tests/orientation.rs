@@ -67,8 +67,8 @@ fn draw(corners: &Corners, by: Mapper) -> PlanarBuffer {
     page
 }
 
-/// Whether a pixel's centre lies on an edge, or on a border between texels. At a single depth the coordinates
-/// are affine: u at the centre, in texels, is (centre - P) x N / (M x N), times SIDE.
+/// Returns whether a pixel's centre lies on an edge, or on a border between texels. At a single depth the
+/// coordinates are affine: u at the centre, in texels, is (centre - P) x N / (M x N), times SIDE.
 fn on_a_border(corners: &Corners, centre: Place) -> bool {
     let minus = |a: Place, b: Place| (i64::from(a.0 - b.0), i64::from(a.1 - b.1));
     let cross = |a: (i64, i64), b: (i64, i64)| a.0 * b.1 - a.1 * b.0;

@@ -201,8 +201,8 @@ fn paint(texels: &mut [u8; MAX_TEXELS]) -> Textures<'_> {
     [tiled(floor, 2 * TILE, most), tiled(wall, most, 2 * TILE)].into()
 }
 
-/// Returns the colour of a texel of marble slabs, dark and light, with gold lines between them and a diamond where four of
-/// them meet.
+/// Returns the colour of a texel of marble slabs, dark and light, with gold lines between them and a diamond
+/// where four of them meet.
 fn slabs(i: i64, j: i64) -> u8 {
     const HALF: i64 = TILE as i64 / 2;
     let from_line = |k: i64| (k % HALF).min(HALF - 1 - k % HALF);
@@ -230,7 +230,8 @@ fn slabs(i: i64, j: i64) -> u8 {
     }
 }
 
-/// Returns the colour of a texel of courses of stone, each offset by half a stone from the one below, and a frieze.
+/// Returns the colour of a texel of courses of stone, each offset by half a stone from the one below, and a
+/// frieze.
 fn courses(i: i64, j: i64) -> u8 {
     const COURSE: i64 = 16;
     let (course, y) = (j / COURSE, j % COURSE);

@@ -188,7 +188,8 @@ fn paint(texels: &mut [u8; MAX_TEXELS]) -> Texture<'_> {
     surfaces::paint(texels, ribbon)
 }
 
-/// Returns the colour of a texel of a gold band around enamel, wound once about the tube, with pearls between two wires.
+/// Returns the colour of a texel of a gold band around enamel, wound once about the tube, with pearls between
+/// two wires.
 fn ribbon(i: i64, j: i64) -> u8 {
     const AROUND: i64 = SIDE as i64;
     // Across the band, 0 to 255: it is wound once for each repetition.

@@ -210,8 +210,8 @@ pub fn board(i: i64, j: i64) -> u8 {
     }
 }
 
-/// Returns the colour of a texel of a plain of small tiles with detail at every distance: near the eye a texel shows a
-/// tile, far away a whole field.
+/// Returns the colour of a texel of a plain of small tiles with detail at every distance: near the eye a
+/// texel shows a tile, far away a whole field.
 pub fn plain(i: i64, j: i64) -> u8 {
     let (field_x, field_y) = (i / 16, j / 16);
     let (x, y) = (i % 16, j % 16);
@@ -310,7 +310,8 @@ pub fn bricks(i: i64, j: i64) -> u8 {
     }
 }
 
-/// Returns the colour of a texel of the side of a crate: boards, iron at the corners, and a crystal ball as an emblem.
+/// Returns the colour of a texel of the side of a crate: boards, iron at the corners, and a crystal ball as
+/// an emblem.
 pub fn crate_side(i: i64, j: i64) -> u8 {
     let (dx, dy) = (2 * i - 255, 2 * j - 255);
     let edge = 255 - dx.abs().max(dy.abs());

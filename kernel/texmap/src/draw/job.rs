@@ -11,9 +11,8 @@ use crate::mappers::pieces::Cuts;
 use crate::mappers::{MappedSpan, Mapper, SpanKind, exact, quadratic};
 use crate::plane::{Face, PlaneStepper, Tolerance};
 
-/// Under [`Rows::Lines`], affine rows of fewer pixels are stepped instead: a line is first made in
-/// RAM, and that costs as much as selecting a plane about eight times. Most spans in the free
-/// direction are this short.
+/// Under [`Rows::Lines`], affine rows of fewer pixels are stepped instead. A line is first made in RAM, which
+/// costs as much as selecting a plane about eight times. Most spans in a free direction are this short.
 const SHORT_ROW: u16 = 8;
 
 impl Style {

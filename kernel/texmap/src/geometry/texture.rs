@@ -17,7 +17,7 @@ pub struct Texture<'a> {
     is_padded: bool,
     /// See [`Texture::masks`].
     masks: u64,
-    /// Masks that keep the tile's bits of a column's number and of a row's.
+    /// Masks that keep the tile's bits of a column's number and of a row's number.
     wrap: (u16, u16),
 }
 
@@ -171,7 +171,7 @@ impl<'a> Texture<'a> {
     /// column's bits are bits 16 and up of u. The row's bits continue them, 32 bits higher, in v
     /// times the pitch.
     ///
-    /// Needed for every column, and therefore computed with the texture.
+    /// Every column needs the mask, so it is computed once, with the texture.
     #[inline]
     pub(crate) fn masks(&self) -> Option<u64> {
         self.is_padded.then_some(self.masks)

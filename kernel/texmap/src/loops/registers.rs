@@ -43,8 +43,8 @@ pub(super) fn start<'c, R: Registers>(
     }
 }
 
-/// A separate function that gets the stepper by value: otherwise the stepper would be stored to
-/// memory before the registers are made.
+/// Draws a column of a texture that the loop does not support. A separate function that gets the stepper by
+/// value: otherwise the stepper would be stored to memory before the registers are made.
 #[inline(never)]
 fn unpadded(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     stepper::column(texture, stepper, column);

@@ -57,8 +57,7 @@ pub enum Loop {
     /// The carry selects one of two steps, without a branch (chapter 58's guess of John Miles's
     /// method). 6 instructions.
     StepTable,
-    /// Two accumulators, shifts and masks; padded textures. 10 instructions, none of which needs a
-    /// flag.
+    /// Two accumulators, shifts and masks; padded textures. 10 instructions, which need no CPU flag.
     #[default]
     Shifts,
     /// One accumulator for both coordinates, shifts and masks; padded textures. 9 instructions.

@@ -1,9 +1,9 @@
 //! Adaptive subdivision: perspective by linear pieces, each as long as an error allows.
 //!
-//! Pieces are linear between the quotients at their ends, as in [`super::linear`], but the length
-//! of a piece depends on where it lies. The texture coordinate is most curved far away. So pieces
-//! are made from the span's near end on, and become shorter and shorter. Where even the shortest
-//! piece errs too much, the rest of the span is drawn exactly.
+//! Pieces are linear between the quotients at their ends, as in [`super::linear`], but the length of a piece
+//! depends on where it lies. The texture coordinate is most curved far away. So pieces are made from the
+//! span's near end on, and become shorter and shorter. Where the error of even the shortest piece is too
+//! large, the rest of the span is drawn exactly.
 //!
 //! # How long
 //!

@@ -32,7 +32,7 @@ impl Side {
             Axis::Down => (|vertex| vertex.x, WIDTH),
             Axis::Right => (|vertex| vertex.y, HEIGHT),
         };
-        // Always forward, so that neighbours step along a shared edge with the same bits.
+        // Step forward always, so that neighbours step along a shared edge with the same bits.
         let (a, b) = if across(a) <= across(b) {
             (a, b)
         } else {
@@ -388,8 +388,8 @@ fn map_sides(
 ) -> Result<(), Dropped> {
     let sides = Sides::new(face.polygon, texture, axis)?;
     spans_and_crossings(axis, face.polygon, |span| {
-        // The span has the stepper that is actually drawn: its reference implementation does not
-        // know the loops.
+        // The span gets the stepper that the loop actually draws, because the reference implementation does
+        // not know the loops.
         let stepper = by.effective(rule(&sides, &span));
         sink(MappedSpan::new(axis, &span, SpanKind::Affine(stepper)));
     })

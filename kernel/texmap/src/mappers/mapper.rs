@@ -40,7 +40,8 @@ pub enum Mapper {
 type Named = (&'static str, Mapper, &'static str);
 
 impl Mapper {
-    /// Every mapper with its name and a line of description, from the sources' first to the exact.
+    /// Every mapper with its name and a line of description, from the sources' first mapper to the exact
+    /// mapper.
     pub const ALL: &'static [Named] = &[
         (
             "row-multiply",
@@ -199,8 +200,8 @@ impl Mapper {
         ),
     ];
 
-    /// The names that mappers had before, each with its present name. [`Mapper::parse`] accepts
-    /// them for one version.
+    /// The former names of mappers, each with the present name. [`Mapper::parse`] accepts them for one
+    /// version.
     pub const RENAMED: [(&'static str, &'static str); 5] = [
         ("two-steps", "step-table"),
         ("joined", "one-accumulator"),
@@ -233,9 +234,9 @@ impl Mapper {
         named.map_or("", |(name, ..)| name)
     }
 
-    /// Returns a faster, less accurate mapper for objects in motion, or `None` if no such mapper
-    /// exists. A tolerance below two texels becomes two texels, and an exact or nearly exact mapper
-    /// becomes linear pieces.
+    /// Returns the mapper of reduced quality, which is faster and less accurate, for objects in motion, or
+    /// `None` if this mapper has no reduced quality. A tolerance below two texels becomes two texels, and an
+    /// exact or nearly exact mapper becomes linear pieces.
     pub fn lower(self) -> Option<Self> {
         const UNSEEN: Tolerance = Tolerance::new(2, 1).expect("two texels are legal");
         match self {

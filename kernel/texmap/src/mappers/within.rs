@@ -46,12 +46,11 @@
 //!
 //! # Columns or rows
 //!
-//! The depth of a floor changes fast down its columns and hardly along its rows, so lines are many
-//! times longer along rows. By the closed form, a line that keeps to a tolerance T is
-//! sqrt(4 T c^3 / |D c'|) pixels long, where c' is the change of c along the line. So at some
-//! places of the polygon the mapper computes the length and the cost of lines in both directions.
-//! The axis with the smaller total cost becomes the polygon's axis. The covered pixels do not
-//! depend on the axis ([`crate::scan`]).
+//! The depth of a floor changes fast down its columns and hardly along its rows, so lines are many times
+//! longer along rows. By the closed form, a line that keeps to a tolerance T is sqrt(4 T c^3 / |D c'|) pixels
+//! long, where c' is the change of c along the line. So at some places of the polygon the mapper computes the
+//! length and the cost of lines in both directions. The axis with the smaller total cost becomes the
+//! polygon's axis. The covered pixels do not depend on the axis ([`crate::scan`]).
 //!
 //! A pixel costs about the same in both directions. A piece of a row is made once in the order of
 //! the polygons and in RAM, but four times in the order of the planes. As a compromise it counts as

@@ -31,7 +31,7 @@ pub struct Crossing {
     pub at: i64,
 }
 
-/// What a scan reports about a side's crossing with a line: [`Crossing`], or nothing.
+/// The data that a scan reports about a side's crossing with a line: [`Crossing`], or nothing.
 pub(crate) trait SpanEnd: Copy + Default {
     /// The precomputed data of a side that yields its crossings.
     type Interpolant: Copy + Default;
@@ -135,7 +135,7 @@ impl<A: Copy> Edge<A> {
         b: (i32, i32),
         lines: &ScanDirection,
     ) -> Option<Self> {
-        // Always forward, so that neighbours step along a shared edge with the same bits.
+        // Step forward always, so that neighbours step along a shared edge with the same bits.
         let (a, b) = if a.0 <= b.0 { (a, b) } else { (b, a) };
         let (first, end) = crossed(a.0, b.0, lines.count)?;
         let (dp, dq) = (b.0 - a.0, b.1 - a.1);

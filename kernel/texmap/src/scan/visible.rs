@@ -56,8 +56,8 @@ struct InverseDepth {
 }
 
 impl InverseDepth {
-    /// Infinitely far away, except that `over` is zero and has to be set. All zeros, so that a
-    /// static of them takes no space in an image.
+    /// Infinitely far away, except that `over` is zero and has to be set. All zeros, so that a static of them
+    /// occupies no space in an image.
     const NONE: Self = Self {
         form: Form {
             origin: 0,
@@ -162,7 +162,7 @@ pub struct Visible<const FACES: usize> {
 }
 
 impl<const FACES: usize> Visible<FACES> {
-    /// Returns a value without faces. It is all zeros, so a static takes no space in an image.
+    /// Returns a value without faces. It is all zeros, so a static occupies no space in an image.
     pub const fn new() -> Self {
         Self {
             columns: [ColumnSpans::EMPTY; WIDTH],
