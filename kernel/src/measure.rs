@@ -1,8 +1,8 @@
 //! The bench kernel: measures what drawing costs on the bare machine.
 //!
-//! It is a separate program beside the demo, built from the same crates and put into a separate image. The
-//! crate [`mod@bench`] does the work and names what can be requested. This file adds the machine's card, its
-//! time stamp counter and its serial line. Interrupts are off from a request to the end of its answer.
+//! It is a separate program beside the demo, built from the same crates and with a separate image. The crate
+//! [`mod@bench`] does the work and defines the requests. This file adds the machine's card, its time stamp
+//! counter and its serial line. Interrupts are off from a request to the end of its answer.
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 use bench::{Bench, BenchMemory, Clock};

@@ -57,7 +57,7 @@ impl<'a> Scenes<'a> {
     /// Resolves a change's name.
     ///
     /// # Errors
-    /// The name is unknown.
+    /// If the name is unknown.
     pub fn resolve(&self, change: Change) -> Result<StateChange, UnknownName> {
         let (setting, name) = match change {
             Change::Act(action) => return Ok(StateChange::Act(action)),
@@ -88,7 +88,7 @@ impl<'a> Scenes<'a> {
     }
 }
 
-/// The error that no value of a setting has this name.
+/// The error of a name that no value of a setting has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct UnknownName(pub Setting, pub Word);
 

@@ -114,8 +114,8 @@ const _: () = assert!(
 );
 
 /// Largest difference of a normal's squared length from 2^28, that of a unit vector: rounding may change each
-/// part by one unit. The light raises a product with the normal to the 32nd power, and longer normals would
-/// overflow 64 bits.
+/// component by one unit. The light raises a product with the normal to the 32nd power, and longer normals
+/// would overflow 64 bits.
 const NORMAL_SLACK: i64 = 1 << 16;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -229,12 +229,12 @@ impl<'p> ModelFile<'p> {
     /// Parses a model file, and checks all of it.
     ///
     /// # Errors
-    /// The first value that is not legal.
+    /// The reason that concerns the first value that is not legal.
     pub fn parse(bytes: &'p [u8]) -> Result<Self, ModelError> {
         if bytes.len() > MAX_BYTES {
             return Err(ModelError::TooLong(bytes.len()));
         }
-        // Check the magic first: bytes of another kind are reported as no model file, not as a short model
+        // Check the magic first, so that other bytes are reported as no model file and not as a short model
         // file.
         if !bytes.starts_with(&MAGIC) {
             return Err(ModelError::NotAModelFile);

@@ -92,9 +92,9 @@ pub type Column<'a> = Lane<'a, STRIDE>;
 
 /// A lane: `len` bytes of one plane, a base and then every `STEP`th byte, open for writing once.
 ///
-/// This is the only type that stores to video memory one byte at a time. The stores are volatile:
-/// the compiler sees neither the card's planes nor the port writes that select them, and it has
-/// deleted a plain store as overwritten.
+/// This is the only type that stores to video memory one byte at a time. The stores are volatile: the
+/// compiler sees neither the card's planes nor the port writes that select them. It once deleted a plain
+/// store as overwritten.
 #[derive(Debug)]
 pub struct Lane<'a, const STEP: usize> {
     base: NonNull<u8>,

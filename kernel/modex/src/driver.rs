@@ -14,8 +14,8 @@ pub type Rgb6 = [u8; 3];
 /// The DAC's 256 entries.
 pub type Palette = [Rgb6; 256];
 
-/// Reads of Input Status 1 before the driver reports that the card does not respond. They take
-/// seconds, while a refresh takes 17 ms.
+/// Reads of Input Status 1 before the driver reports that the card does not respond. They last some seconds;
+/// a refresh lasts 17 ms.
 const POLLS: u32 = 10_000_000;
 
 /// Bytes of one wide store, and of one group of the records in [`Drawn`]: 8 bytes, 32 pixels, of a
@@ -103,9 +103,9 @@ impl fmt::Display for SetError {
 
 impl core::error::Error for SetError {}
 
-/// The parts of a page that were drawn on since the page last held the bare background: for each
-/// group of 32 pixel columns, the lines from a top to a bottom. Both records only grow, and start
-/// at zero, so a lane is added without testing whether its group had any.
+/// The parts of a page that were drawn on since the page last held the bare background: for each group of 32
+/// pixel columns, the lines from a top to a bottom. Both records only grow, and start at zero, so a lane is
+/// added without a test whether its group already has lines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn {
     /// Lines from the top to the page's end.
@@ -115,7 +115,7 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
-    /// All zeros, so that a value that begins with it takes no space in the kernel's image.
+    /// Nothing drawn. All zeros, so that a value that contains it occupies no space in the kernel's image.
     pub(crate) const NOTHING: Self = Self {
         rise: [0; GROUPS],
         bottom: [0; GROUPS],
@@ -202,11 +202,10 @@ impl Drawn {
 /// page is shown between the end of the display and that latch, or ever after. So from B on the old
 /// page is free.
 ///
-/// The argument needs no bound on any time: an interrupt between two accesses only makes A or B
-/// later. The other order, to see the card display and then to write, does need a bound: the driver
-/// may see the display on its last line, and its write may come after the latch, while the retrace
-/// that it then waits for has already begun. It would draw on the old page while the card shows
-/// that page for another refresh.
+/// The argument needs no bound on any time: an interrupt between two accesses only makes A or B later. The
+/// other order, to see the display first and then write, would need a bound: the driver may see the display
+/// on its last line, and its write may come after the latch, while the retrace that it then waits for has
+/// already begun. It would draw on the old page while the card shows that page for another refresh.
 #[derive(Debug)]
 pub struct ModeX<B> {
     bus: B,
@@ -241,8 +240,8 @@ impl<B: Bus> ModeX<B> {
     /// all four planes; page 0 is shown. The result does not depend on the card's earlier state.
     ///
     /// # Errors
-    /// The first register that reads back wrong, or the first byte of a plane that does; or a beam
-    /// that does not move.
+    /// If a register or a byte of a plane reads back wrong (the error names the first), or if the beam does
+    /// not move.
     pub fn reset(&mut self, palette: &Palette) -> Result<(), SetError> {
         let bus = &mut self.bus;
         bus.purpose(Purpose::Setup);
@@ -254,8 +253,8 @@ impl<B: Bus> ModeX<B> {
         for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
             bus.store64(at as u16, 0);
         }
-        // Until the next refresh the CRTC displays from the old start address, where a page may lie
-        // that is drawn on next.
+        // Until the next refresh the CRTC displays from the old start address, and the page that is drawn on
+        // next may lie there.
         self.wait_for_frame().map_err(SetError::Beam)?;
         let bus = &mut self.bus;
         let clocking = MODE_X.sequencer[usize::from(CLOCKING_MODE)];
@@ -294,7 +293,7 @@ impl<B: Bus> ModeX<B> {
     /// more.
     fn turn(&mut self) {
         self.back = (self.back + 1) % PAGES;
-        // This happens only after pages that were drawn without a flip: the front page is not free.
+        // Happens only after pages that were drawn without a flip. The front page is not free.
         if self.back == self.front {
             self.back = (self.front + 1) % PAGES;
         }

@@ -39,7 +39,8 @@ impl<'d, D: Destination> Window<'d, D> {
         }
     }
 
-    /// Returns which of `len` pixels, `step` columns apart from column `x` on, are shown.
+    /// Returns which of `len` pixels are shown. The first is in column `x`, and they lie `step` columns
+    /// apart.
     fn shown(&self, x: u16, len: u16, step: u16) -> Range<u16> {
         let before = |column: u16| column.saturating_sub(x).div_ceil(step).min(len);
         before(self.columns.start)..before(self.columns.end)
