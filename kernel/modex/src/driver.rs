@@ -18,8 +18,7 @@ pub type Palette = [Rgb6; 256];
 /// a refresh lasts 17 ms.
 const POLLS: u32 = 10_000_000;
 
-/// Bytes of one wide store, and of one group of the records in [`Drawn`]: 8 bytes, 32 pixels, of a
-/// line.
+/// Bytes of one wide store, and of one group of the records in [`Drawn`]: 8 bytes, 32 pixels, of a line.
 const GROUP_BYTES: usize = 8;
 const GROUPS: usize = STRIDE / GROUP_BYTES;
 const GROUP_PIXELS: u16 = 4 * GROUP_BYTES as u16;
@@ -38,9 +37,9 @@ pub enum SetError {
         /// The value that the card returned.
         actual: u8,
     },
-    /// The window at A0000h is not four planes of 64 KiB: a byte of a plane does not hold the value
-    /// that was stored through Map Mask. RAM in place of the window fails this way, because it
-    /// keeps one byte where the card keeps four.
+    /// The window at A0000h is not four planes of 64 KiB: a byte of a plane does not hold the value that was
+    /// stored through Map Mask. RAM in place of the window fails this way, because it keeps one byte where
+    /// the card keeps four.
     Plane {
         /// The plane, 0 to 3.
         plane: u8,
@@ -139,8 +138,7 @@ impl Drawn {
         }
     }
 
-    /// Adds the pixel columns `first..=last`, lines `top..bottom`, all of which must be in the
-    /// frame.
+    /// Adds the pixel columns `first..=last`, lines `top..bottom`, all of which must be in the frame.
     #[inline]
     pub(crate) fn add(&mut self, first: u16, last: u16, top: u16, bottom: u16) {
         for group in usize::from(first / GROUP_PIXELS)..=usize::from(last / GROUP_PIXELS) {
@@ -173,8 +171,7 @@ impl Drawn {
         both
     }
 
-    /// Returns the groups of 8 bytes that were drawn on, counted from the page's start, each with
-    /// its line.
+    /// Returns the groups of 8 bytes that were drawn on, counted from the page's start, each with its line.
     pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, usize)> {
         let lines = self.rise.into_iter().zip(self.bottom);
         lines.enumerate().flat_map(|(group, (rise, bottom))| {
@@ -190,17 +187,16 @@ impl Drawn {
 ///
 /// # Why nothing tears
 ///
-/// The pages share the low byte of their start address, so a flip is a single write of one byte: at
-/// any moment the CRTC has the address of one page or of the other. The CRTC latches the start
-/// address once per refresh. The moment differs from card to card, but it always lies after the
-/// last displayed line and before the first line of the next refresh.
+/// The pages share the low byte of their start address, so a flip is a single write of one byte: at any
+/// moment the CRTC has the address of one page or of the other. The CRTC latches the start address once per
+/// refresh. The moment differs from card to card, but it always lies after the last displayed line and before
+/// the first line of the next refresh.
 ///
 /// [`ModeX::flip`] writes the address at any time. After that write, [`ModeX::settle`] reads Input
-/// Status 1: first until the card displays (at a time A), then until the card is in the vertical
-/// retrace (at a later time B). The end of a refresh's display lies between A and B. The latch that
-/// follows this end comes after A, so after the write, and gets the new page. No line of the old
-/// page is shown between the end of the display and that latch, or ever after. So from B on the old
-/// page is free.
+/// Status 1: first until the card displays (at a time A), then until the card is in the vertical retrace (at
+/// a later time B). The end of a refresh's display lies between A and B. The latch that follows this end
+/// comes after A, so after the write, and gets the new page. No line of the old page is shown between the end
+/// of the display and that latch, or ever after. So from B on the old page is free.
 ///
 /// The argument needs no bound on any time: an interrupt between two accesses only makes A or B later. The
 /// other order, to see the display first and then write, would need a bound: the driver may see the display
@@ -236,8 +232,8 @@ impl<B: Bus> ModeX<B> {
         Ok(card)
     }
 
-    /// Sets the mode, reads it back, proves that the window is planar, loads the palette and clears
-    /// all four planes; page 0 is shown. The result does not depend on the card's earlier state.
+    /// Sets the mode, reads it back, proves that the window is planar, loads the palette and clears all four
+    /// planes; page 0 is shown. The result does not depend on the card's earlier state.
     ///
     /// # Errors
     /// If a register or a byte of a plane reads back wrong (the error names the first), or if the beam does
@@ -265,12 +261,10 @@ impl<B: Bus> ModeX<B> {
         Ok(())
     }
 
-    /// Returns the page after the page drawn last, on its bare background: `background[y]` is the
-    /// colour of line y. Waits first, as [`ModeX::settle`] does, if that page may still be on the
-    /// screen.
+    /// Returns the page after the page drawn last, on its bare background: `background[y]` is the colour of
+    /// line y. Waits first, as [`ModeX::settle`] does, if that page may still be on the screen.
     ///
-    /// Only the parts of the page that were drawn on are restored, in wide stores to all planes at
-    /// once.
+    /// Only the parts of the page that were drawn on are restored, in wide stores to all planes at once.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) -> Canvas<'_, B> {
         self.turn();
         self.bus.purpose(Purpose::Erase);
@@ -289,8 +283,7 @@ impl<B: Bus> ModeX<B> {
         }
     }
 
-    /// Moves to the page after the page drawn last, and waits until it cannot be on the screen any
-    /// more.
+    /// Moves to the page after the page drawn last, and waits until it cannot be on the screen any more.
     fn turn(&mut self) {
         self.back = (self.back + 1) % PAGES;
         // Happens only after pages that were drawn without a flip. The front page is not free.
@@ -302,9 +295,9 @@ impl<B: Bus> ModeX<B> {
         }
     }
 
-    /// Copies `offscreen` to the page after the page drawn last, where both are on the same
-    /// background. Stores the parts that were drawn on in either, eight bytes at a time, plane by
-    /// plane. Waits as [`ModeX::begin`] does.
+    /// Copies `offscreen` to the page after the page drawn last, where both are on the same background.
+    /// Stores the parts that were drawn on in either, eight bytes at a time, plane by plane. Waits as
+    /// [`ModeX::begin`] does.
     pub fn present(&mut self, offscreen: &Offscreen) {
         self.turn();
         self.bus.purpose(Purpose::Draw);
@@ -365,8 +358,8 @@ impl<B: Bus> ModeX<B> {
         page_start(self.front) as u16
     }
 
-    /// Reads pixels back from the card: pixel i is in plane i & 3 at `at` + i / 4, which wraps
-    /// within the plane. Writes no byte of video memory.
+    /// Reads pixels back from the card: pixel i is in plane i & 3 at `at` + i / 4, which wraps within the
+    /// plane. Writes no byte of video memory.
     pub fn load(&mut self, at: u16, pixels: &mut [u8]) {
         self.bus.purpose(Purpose::Setup);
         for plane in 0..4 {
@@ -444,9 +437,8 @@ impl<B: Bus> Destination for Canvas<'_, B> {
         self.bus.lane(at as u16, len, draw);
     }
 
-    /// Writes the row with one Map Mask write and one store per pixel. The mask is kept twice in a
-    /// byte and rotated: the bit that arrives in bit 0 is the step of the address, from plane 3 to
-    /// plane 0.
+    /// Writes the row with one Map Mask write and one store per pixel. The mask is kept twice in a byte and
+    /// rotated: the bit that arrives in bit 0 is the step of the address, from plane 3 to plane 0.
     fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {
         let last = check_row(x, y, len);
         self.drawn.add(x, last, y, y + 1);
@@ -461,8 +453,8 @@ impl<B: Bus> Destination for Canvas<'_, B> {
     }
 }
 
-/// Returns the last screen column of a lane and the line after its last, after checking that the
-/// lane lies in the frame.
+/// Returns the last screen column of a lane and the line after its last, after checking that the lane lies in
+/// the frame.
 #[inline]
 pub(crate) fn check_lane<const STEP: usize>(x: u16, y: u16, len: u16) -> (u16, u16) {
     const {
@@ -500,12 +492,12 @@ fn write<B: Bus>(bus: &mut B, port: u16, index: u8, value: u8) {
     bus.out16(port, u16::from_le_bytes([index, value]));
 }
 
-/// Leaves the linear mode that the boot loader's VESA call left behind. No register of the plain
-/// VGA shows this mode.
+/// Leaves the linear mode that the boot loader's VESA call left behind. No register of the plain VGA shows
+/// this mode.
 ///
-/// While DISPI is enabled, QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card
-/// has no DISPI (its ID does not read B0Cx); while its SR7 bit 0 is set, stores go to linear memory
-/// and bypass Map Mask. On any other card, every register outside the plain VGA keeps its value.
+/// While DISPI is enabled, QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card has no
+/// DISPI (its ID does not read B0Cx); while its SR7 bit 0 is set, stores go to linear memory and bypass Map
+/// Mask. On any other card, every register outside the plain VGA keeps its value.
 fn leave_linear_mode<B: Bus>(bus: &mut B) {
     bus.out16(DISPI_INDEX, DISPI_ID);
     if bus.in16(DISPI_DATA) & 0xFFF0 == 0xB0C0 {
@@ -519,16 +511,16 @@ fn leave_linear_mode<B: Bus>(bus: &mut B) {
     for (port, index) in CIRRUS_EXTENSIONS {
         write(bus, port, index, 0);
     }
-    // The card's DAC has a hidden register behind PEL Mask. It opens after four reads, and holds
-    // the colour depth of the linear mode.
+    // The card's DAC has a hidden register behind PEL Mask. It opens after four reads, and holds the colour
+    // depth of the linear mode.
     for _ in 0..4 {
         bus.in8(PEL_MASK);
     }
     bus.out8(PEL_MASK, 0);
 }
 
-/// Unlocks a Cirrus Logic card's own registers. Returns false for any other card, whose SR6 then
-/// has its old value again.
+/// Unlocks a Cirrus Logic card's own registers. Returns false for any other card, whose SR6 then has its old
+/// value again.
 ///
 /// A Cirrus answers a key with a value that was not written: after any value but the key, SR6 reads
 /// [`CIRRUS_LOCKED`], and after the key it reads the key. A register that simply holds the written
@@ -564,8 +556,7 @@ fn write_mode<B: Bus>(bus: &mut B, mode: &Mode) {
         write(bus, SEQUENCER, index, value | off);
     }
     write(bus, SEQUENCER, RESET, mode.sequencer[usize::from(RESET)]);
-    // While CR11 bit 7 is set, the card ignores writes to CR0-7. The table's own value sets it
-    // again.
+    // While CR11 bit 7 is set, the card ignores writes to CR0-7. The table's own value sets it again.
     let unprotected = mode.crtc[usize::from(VERTICAL_RETRACE_END)] & !PROTECT;
     write(bus, CRTC, VERTICAL_RETRACE_END, unprotected);
     for (index, &value) in (0..).zip(&mode.crtc) {
@@ -592,8 +583,7 @@ fn write_palette<B: Bus>(bus: &mut B, palette: &Palette) {
     }
 }
 
-/// Reads every register of the mode. The screen blanks while the attribute controller's palette is
-/// open.
+/// Reads every register of the mode. The screen blanks while the attribute controller's palette is open.
 fn read_mode<B: Bus>(bus: &mut B) -> Mode {
     let mut mode = Mode {
         misc: bus.in8(MISC_READ),
@@ -644,12 +634,12 @@ fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), SetError> {
     Ok(())
 }
 
-/// Proves that the window is four planes of 64 KiB: stores a different byte in each plane, at the
-/// start of each half of the window, through Map Mask, and loads each byte through Read Map. All
-/// eight bytes differ, so no plane can stand in for another plane, and neither half for the other.
+/// Proves that the window is four planes of 64 KiB: stores a different byte in each plane, at the start of
+/// each half of the window, through Map Mask, and loads each byte through Read Map. All eight bytes differ,
+/// so no plane can stand in for another plane, and neither half for the other.
 ///
-/// The registers prove nothing about the window: they read back correctly even while a machine
-/// shows RAM at A0000h.
+/// The registers prove nothing about the window: they read back correctly even while a machine shows RAM at
+/// A0000h.
 fn check_planes<B: Bus>(bus: &mut B) -> Result<(), SetError> {
     const HALVES: [u16; 2] = [0, (PLANE_BYTES / 2) as u16];
     let bytes = || {

@@ -6,11 +6,11 @@ use crate::column::check_row;
 use crate::driver::check_lane;
 use crate::{Destination, Lane, STRIDE, WIDTH};
 
-/// Some columns of a frame, shown at other columns of a destination. Pixels outside these columns
-/// are not drawn.
+/// Some columns of a frame, shown at other columns of a destination. Pixels outside these columns are not
+/// drawn.
 ///
-/// A window moves columns by whole addresses, four columns each, so every column keeps its plane.
-/// Code that draws by planes, or selects one plane for many columns, works unchanged.
+/// A window moves columns by whole addresses, four columns each, so every column keeps its plane. Code that
+/// draws by planes, or selects one plane for many columns, works unchanged.
 #[derive(Debug)]
 pub struct Window<'d, D> {
     destination: &'d mut D,
@@ -22,8 +22,8 @@ impl<'d, D: Destination> Window<'d, D> {
     /// Returns a window that shows the frame's `columns` from column `to` of `destination` on.
     ///
     /// # Panics
-    /// If the columns leave the frame on either side, or if they would move by a distance that is
-    /// not a multiple of four.
+    /// If the columns leave the frame on either side, or if they would move by a distance that is not a
+    /// multiple of four.
     pub fn new(destination: &'d mut D, columns: Range<u16>, to: u16) -> Self {
         let (width, frame) = (columns.end.saturating_sub(columns.start), WIDTH as u16);
         assert!(
@@ -77,8 +77,7 @@ impl<D: Destination> Destination for Window<'_, D> {
             let x = self.moved(x);
             self.destination.lane(x, y, len, draw);
         } else if !shown.is_empty() {
-            // `draw` has to begin at the first pixel, so draw the whole lane into RAM and copy the
-            // part.
+            // `draw` has to begin at the first pixel, so draw the whole lane into RAM and copy the part.
             let mut whole = [0; STRIDE];
             draw(Lane::over(&mut whole[..len.into()]));
             let part = &whole[usize::from(shown.start)..usize::from(shown.end)];

@@ -292,8 +292,8 @@ fn a_free_line_without_slope_goes_through_the_centres() {
     }
 }
 
-/// Returns the error of linear interpolation between two points whose depth ratio is r: |du| (sqrt r -
-/// 1)/(sqrt r + 1).
+/// Returns the error of linear interpolation between two points whose depth ratio is r:
+/// |du| (sqrt r - 1)/(sqrt r + 1).
 fn linear(plane: &Plane, k: usize, (x, y): (f64, f64), (to_x, to_y): (f64, f64)) -> Option<f64> {
     let du = quotient(plane, k, to_x, to_y)? - quotient(plane, k, x, y)?;
     let (c, to_c) = (at(&plane.c, x, y), at(&plane.c, to_x, to_y));

@@ -28,8 +28,7 @@ pub fn texture(texels: &[u8]) -> Texture<'_> {
     Texture::padded(texels, SIDE, SIDE).expect("SIDE x SIDE texels")
 }
 
-/// Steps of 0.20 and 0.27 texel a pixel: the frame lies aslant in the texture and almost fills
-/// it.
+/// Steps of 0.20 and 0.27 texel a pixel: the frame lies aslant in the texture and almost fills it.
 const STEPS: (i32, i32) = (13_235, 17_695);
 
 /// Returns the stepper down column `x`.
@@ -204,8 +203,8 @@ pub fn bare(texels: &[u8], mut column: Column<'_>) {
                 )*)
             };
         }
-        // SAFETY: the loads are inside the 16 texels; the stores are the column's pixels, as
-        // `Lane::new` was promised. The stack is not used.
+        // SAFETY: the loads are inside the 16 texels; the stores are the column's pixels, as `Lane::new` was
+        // promised. The stack is not used.
         unsafe {
             asm!(
                 "jmp 3f",

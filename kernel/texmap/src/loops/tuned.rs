@@ -1,14 +1,13 @@
 //! The loops in x86-64 instructions. [`super::select`] explains why they may read without a check.
 //!
-//! All loops share a frame of code: blocks of [`BLOCK`] pixels, where each store has a constant
-//! offset (chapter 58). The frame enters the first block in the middle, so that the pixels left
-//! fill whole blocks. So one loop draws any height, a column of one pixel included, with a single
-//! jump that is hard to predict. Nothing between pixels changes the carry flag (LEA steps the
-//! address, DEC counts), so a loop may keep a carry in it. The fastest loops have a second frame,
-//! for pieces of columns whose pixels come in eights.
+//! All loops share a frame of code: blocks of [`BLOCK`] pixels, where each store has a constant offset
+//! (chapter 58). The frame enters the first block in the middle, so that the pixels left fill whole blocks.
+//! So one loop draws any height, a column of one pixel included, with a single jump that is hard to predict.
+//! Nothing between pixels changes the carry flag (LEA steps the address, DEC counts), so a loop may keep a
+//! carry in it. The fastest loops have a second frame, for pieces of columns whose pixels come in eights.
 //!
-//! Every function gets the first values of its registers in a type of [`super::registers`]. That
-//! type was made from a stepper that stays in the texture, or has masks that do.
+//! Every function gets the first values of its registers in a type of [`super::registers`]. That type was
+//! made from a stepper that stays in the texture, or has masks that do.
 
 #![allow(unsafe_code)]
 

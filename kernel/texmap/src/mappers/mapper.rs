@@ -23,8 +23,7 @@ pub enum Mapper {
     Linear(Subdivision),
     /// Perspective: quadratic pieces in each column.
     Quadratic(Subdivision),
-    /// Linear pieces of 16 pixels, along columns or rows, whichever direction changes the depth
-    /// less.
+    /// Linear pieces of 16 pixels, along columns or rows, whichever direction changes the depth less.
     RowOrColumn,
     /// Affine in tiles of 16 x 16 pixels.
     Tiles,
@@ -216,8 +215,8 @@ impl Mapper {
         found.map(|&(_, new)| new)
     }
 
-    /// Returns the mapper with this name, if any: a name in [`Mapper::ALL`], a former name, or
-    /// `within-` and any [`Tolerance`].
+    /// Returns the mapper with this name, if any: a name in [`Mapper::ALL`], a former name, or `within-` and
+    /// any [`Tolerance`].
     pub fn parse(name: &str) -> Option<Self> {
         let name = Self::renamed(name).unwrap_or(name);
         if let Some(tolerance) = name.strip_prefix("within-") {
@@ -227,8 +226,8 @@ impl Mapper {
         named.map(|&(_, mapper, _)| mapper)
     }
 
-    /// Returns the mapper's name in [`Mapper::ALL`], or an empty string for a tolerance that is not
-    /// listed there. `Display` writes the names of all mappers.
+    /// Returns the mapper's name in [`Mapper::ALL`], or an empty string for a tolerance that is not listed
+    /// there. `Display` writes the names of all mappers.
     pub fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(_, mapper, _)| *mapper == self);
         named.map_or("", |(name, ..)| name)
@@ -266,8 +265,7 @@ impl Mapper {
     ///
     /// # Errors
     /// If the polygon is outside the legal range; then `sink` has received no span.
-    // `sink` is dynamic, so that a program has this code once. Generic over `sink`, it would have
-    // ten copies.
+    // `sink` is dynamic, so that a program has this code once. Generic over `sink`, it would have ten copies.
     pub(crate) fn map(
         self,
         face: &Face<'_>,
