@@ -171,8 +171,8 @@ pub struct Demo<'a, B> {
 
 impl<'a, B: Bus> Demo<'a, B> {
     /// Paints the default scene into `memory`, sets the card's mode, and starts a running demo. The model of
-    /// `model_file` becomes a scene beside the built-in ones, and the default. Without a model file, the ball
-    /// is the default.
+    /// `model_file` becomes a scene beside the built-in scenes, and the default. Without a model file, the
+    /// ball is the default.
     ///
     /// # Errors
     /// As [`ModeX::set`](modex::ModeX::set): nothing can be drawn on this card.

@@ -26,7 +26,7 @@ const GROUP_PIXELS: u16 = 4 * GROUP_BYTES as u16;
 /// The reason why Mode X could not be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetError {
-    /// A register reads back another value than the one written.
+    /// A register reads back a value that differs from the written value.
     Register {
         /// The block, as [`Mode::blocks`] names it.
         block: &'static str,

@@ -140,7 +140,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// Returns the textures in full light; `texels` holds the painted ones.
+    /// Returns the textures in full light; `texels` holds the texels of painted textures.
     pub fn paint<'m>(&self, texels: &'m mut [u8; MAX_TEXELS]) -> Textures<'m>
     where
         'a: 'm,

@@ -105,8 +105,8 @@ fn rose(longitude: u32, polar: u32) -> Option<u8> {
     let polar = i64::from(polar);
     // Quarter degrees from the nearer pole.
     let radius = polar.min((1 << 31) - polar) * 4 / DEGREE;
-    // Six long points, and six short ones between them. Each value is the angle from the point's axis, scaled
-    // so that a whole turn leads from one axis to the next.
+    // Six long points, and six short points between them. Each value is the angle from the point's axis,
+    // scaled so that a whole turn leads from one axis to the next.
     let long = longitude.wrapping_mul(6);
     let short = long.wrapping_add(1 << 31);
     let in_point = |angle: u32, tip: i64, valley: i64| {

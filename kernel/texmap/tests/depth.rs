@@ -115,9 +115,9 @@ fn quotient(plane: &Plane, k: usize, x: f64, y: f64) -> Option<f64> {
     (c > 0.0).then(|| n / c * 65536.0)
 }
 
-/// Compares the coordinates of every pixel of a face with the exact ones. `bound` returns the largest allowed
-/// error for u or v (0 or 1), at a pixel and its number in its job, if a limit exists. Returns the number of
-/// pixels, and the worst error as a fraction of its bound, among bounds of at least `least`.
+/// Compares the coordinates of every pixel of a face with the exact coordinates. `bound` returns the largest
+/// allowed error for u or v (0 or 1), at a pixel and its number in its job, if a limit exists. Returns the
+/// number of pixels, and the worst error as a fraction of its bound, among bounds of at least `least`.
 fn compare(
     mapper: Mapper,
     least: f64,

@@ -231,8 +231,9 @@ fn none_cheaper(
         // Pixels for which a quadratic of 32 pixels would have needed three quarters of the time.
         let curves = (done..len - 1).step_by(32).filter(|&at| at + 32 < len);
         let first = |at: u16| if backward { len - 1 - at - 32 } else { at };
-        let bends = curves.map(|at| SpanBound::new(&from(stepper, first(at)), 33, texture));
-        let curved = bends.filter(|bend| bend.quadratic(Subdivision::Whole) <= tolerance.units());
+        let bounds = curves.map(|at| SpanBound::new(&from(stepper, first(at)), 33, texture));
+        let curved =
+            bounds.filter(|bound| bound.quadratic(Subdivision::Whole) <= tolerance.units());
         let curved = 32 * curved.count() as u16;
         count("exact, a curve would do", curved);
         count("exact", rest - curved);

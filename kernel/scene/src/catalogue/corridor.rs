@@ -230,8 +230,8 @@ fn slabs(i: i64, j: i64) -> u8 {
     }
 }
 
-/// Returns the colour of a texel of courses of stone, each offset by half a stone from the one below, and a
-/// frieze.
+/// Returns the colour of a texel of courses of stone, each offset by half a stone from the course below, and
+/// a frieze.
 fn courses(i: i64, j: i64) -> u8 {
     const COURSE: i64 = 16;
     let (course, y) = (j / COURSE, j % COURSE);

@@ -300,7 +300,7 @@ pub fn bricks(i: i64, j: i64) -> u8 {
         return shade(Indigo, 4 + part(grain, 4));
     }
     let own = hash([course, brick, 0], 13);
-    // Lit from the upper left: two bright sides and two dark ones.
+    // Lit from the upper left: two bright sides and two dark sides.
     let bevel = i64::from(x == 2 || y == 2) * 2 - i64::from(x == width - 1 || y == 15) * 2;
     let body = part(own, 4) + part(grain, 5) + bevel;
     match (ramp, own % 5) {

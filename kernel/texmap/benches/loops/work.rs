@@ -104,10 +104,10 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
         By::Pieces(length) => {
             let tolerance = tolerance(length);
             columns(page, texture, order, |x| {
-                SpanKind::Adaptive(leaning(x, 1, 13), tolerance)
+                SpanKind::Adaptive(receding(x, 1, 13), tolerance)
             });
         }
-        By::Quotients => columns(page, texture, order, |x| SpanKind::Exact(leaning(x, 8, 8))),
+        By::Quotients => columns(page, texture, order, |x| SpanKind::Exact(receding(x, 8, 8))),
         By::Rows(rows) => {
             let style = Style {
                 rows,
@@ -131,11 +131,11 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
 /// Lengths of pieces that are timed.
 pub const PIECES: [u16; 4] = [8, 16, 32, 64];
 
-/// Returns the forms down column `x`. With every pixel, c falls by a part in 2^`lean` of its first value. The
-/// texture coordinates begin with steps of 1 / `part` of the frame's.
-fn leaning(x: u16, part: i64, lean: u32) -> PlaneStepper {
+/// Returns the forms down column `x`. With every pixel, c falls by a part in 2^`shift` of its first value.
+/// The texture coordinates begin with steps of 1 / `part` of the frame's.
+fn receding(x: u16, part: i64, shift: u32) -> PlaneStepper {
     let depth = 1 << 44;
-    let fall = -(depth >> lean);
+    let fall = -(depth >> shift);
     let AffineStepper { u, v, du, dv } = down(x);
     let form = |at: i32, step: i32| {
         let (at, step) = (i64::from(at), i64::from(step) / part);

@@ -131,7 +131,7 @@ mod tests {
 
     use super::*;
 
-    /// Later jobs overwrite earlier ones, so a chain must keep their order and lose no job.
+    /// Later jobs overwrite earlier jobs, so a chain must keep their order and lose no job.
     #[test]
     fn every_plane_has_its_jobs_in_the_order_in_which_they_came() {
         let mut random = seeded::generator();

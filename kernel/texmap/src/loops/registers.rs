@@ -287,9 +287,9 @@ impl Registers for Joint {
 ///
 /// A step's whole texels may be negative, and are added together with the fraction as a single number. In a
 /// span inside its texture the whole texels of the sum are not negative, so the fraction gets back exactly
-/// what it lent. But the *carry* is right only while the step as a number is not negative, which it would be
-/// with negative whole texels and a fraction of zero. Therefore each step's fraction is too large by one part
-/// in 2^32. That does not reach the fraction's 16 bits within 65 535 pixels.
+/// the units that it lent. But the *carry* is right only while the step as a number is not negative, which it
+/// would be with negative whole texels and a fraction of zero. Therefore each step's fraction is too large by
+/// one part in 2^32. That does not reach the fraction's 16 bits within 65 535 pixels.
 pub(super) struct Crossed {
     /// Bits of a column's number.
     pub columns: u32,

@@ -298,21 +298,21 @@ impl AffineMap {
     pub fn stepper<End>(&self, span: &Span<End>) -> AffineStepper {
         let (x, y) = (i64::from(span.line), i64::from(span.first));
         let steps = i64::from(span.len) - 1;
-        let stepped = |along: &Gradient, last: i32| {
-            let first = along.origin + x * along.right + y * along.down;
+        let stepped = |gradient: &Gradient, last: i32| {
+            let first = gradient.origin + x * gradient.right + y * gradient.down;
             let start = first >> 16;
             if self.inside {
-                return (start as i32, along.step);
+                return (start as i32, gradient.step);
             }
-            let stop = start + steps * i64::from(along.step);
+            let stop = start + steps * i64::from(gradient.step);
             // As an unsigned number, a negative coordinate is above every size.
             let inside = |at: i64| at as u64 <= last as u64;
             if inside(start) && inside(stop) {
-                return (start as i32, along.step);
+                return (start as i32, gradient.step);
             }
             let clamped = |at: i64| at.clamp(0, last.into()) as i32;
             let start = clamped(start);
-            let stop = clamped((first + steps * along.down) >> 16);
+            let stop = clamped((first + steps * gradient.down) >> 16);
             // A span of one pixel has no step.
             (start, (stop - start) / (steps as i32).max(1))
         };

@@ -1,9 +1,10 @@
 //! The free-direction mapper: spans along the lines of constant depth, in whatever direction they run.
 //!
-//! Every plane has lines of constant depth on the screen: along them c stays constant, so c.right dx + c.down
-//! dy = 0. Along such a line u and v are linear, and one division serves the whole line. Pixels do not lie
-//! exactly on the line, so the mapper draws it through the pixels nearest to it. A line nearer the horizontal
-//! has one pixel in every column that it crosses, and a line nearer the vertical has one pixel in every row.
+//! Every plane has lines of constant depth on the screen: along them c stays constant, so
+//! c.right dx + c.down dy = 0. Along such a line u and v are linear, and one division serves the whole line.
+//! Pixels do not lie exactly on the line, so the mapper draws the line through the pixels nearest to it. A
+//! line nearer the horizontal has one pixel in every column that it crosses, and a line nearer the vertical
+//! has one pixel in every row.
 //! All lines are copies of one line, moved by whole pixels (down, or to the right), so each pixel of the
 //! screen lies on exactly one line.
 //!

@@ -12,10 +12,10 @@
 //! Over n steps of one pixel, the value grows by S at the first step, and S grows by T at each step, with
 //! T = 2 K / n^2 and S = (d - K) / n + K / n^2. (S and T are differences, so they are not the polynomial's
 //! two coefficients, which belong to infinitely small steps.) They have 48 fraction bits. S is off by less
-//! than 2^10 units in the last place and T by less than 2^11 / n (see `share`, with |d - K|
-//! <= 2 |d| <= 2^25), and both are exact where n is a power of two. So over 319 pixels the value drifts by
-//! less than 2^-26 texel. It starts half of 2^-16 higher, so that cutting off the remaining bits rounds to
-//! nearest, and a drift below zero or beyond the last coordinate is cut off with them.
+//! than 2^10 units in the last place and T by less than 2^11 / n (see `share`, with
+//! |d - K| <= 2 |d| <= 2^25), and both are exact where n is a power of two. So over 319 pixels the value
+//! drifts by less than 2^-26 texel. It starts half of 2^-16 higher, so that cutting off the remaining bits
+//! rounds to nearest, and a drift below zero or beyond the last coordinate is cut off with them.
 //!
 //! A quadratic may leave the interval between its ends. It stays inside if it does not turn between them,
 //! that is, where |K| <= |d|: its slope is d - K at one end and d + K at the other. A piece that turns is
@@ -73,7 +73,7 @@ struct Path {
 
 impl Path {
     /// Returns the path from `u` in constant steps of `step`, both 16.16.
-    fn straight(u: i32, step: i32) -> Self {
+    fn linear(u: i32, step: i32) -> Self {
         Self {
             at: i64::from(u) << 32,
             step: i64::from(step) << 32,
@@ -154,7 +154,7 @@ impl Quadratic {
         let piece = cuts.next();
         let Piece { from, to, .. } = piece;
         if piece.steps == 0 {
-            let paths = [from.0, from.1].map(|u| [Path::straight(u, 0); 2]);
+            let paths = [from.0, from.1].map(|u| [Path::linear(u, 0); 2]);
             return Self {
                 pixels: piece.pixels,
                 second: piece.pixels,
@@ -254,7 +254,7 @@ impl PolynomialStepper {
         }
         let piece = self.cuts.next();
         let steps = i32::from(piece.steps.max(1));
-        let path = |from: i32, to: i32| [Path::straight(from, (to - from) / steps); 2];
+        let path = |from: i32, to: i32| [Path::linear(from, (to - from) / steps); 2];
         Quadratic {
             pixels: piece.pixels,
             second: piece.pixels,

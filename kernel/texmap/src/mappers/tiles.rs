@@ -1,11 +1,11 @@
 //! The tile mapper: the screen's grid cuts the polygon, and the mapping is affine inside each tile.
 //!
-//! Renderers of the time cut polygons into smaller ones and drew those affine. But new vertices would have to
-//! be snapped, and would move the frame's outline and seams. Here the screen's own grid cuts, every [`SIDE`]
-//! pixels, so coverage does not change. The quotient is computed at the corners of the tiles, which are
-//! centres of pixels and are shared by neighbouring tiles. A column's span is cut where it passes from one
-//! tile into the next. Its coordinates at the tile's top and bottom are interpolated between the corners, and
-//! the coordinates of its pixels between top and bottom. Every division by a length is a shift.
+//! Renderers of the time cut polygons into smaller polygons and drew these affine. But new vertices would
+//! have to be snapped, and would move the frame's outline and seams. Here the screen's own grid cuts, every
+//! [`SIDE`] pixels, so coverage does not change. The quotient is computed at the corners of the tiles, which
+//! are centres of pixels and are shared by neighbouring tiles. A column's span is cut where it passes from
+//! one tile into the next. Its coordinates at the tile's top and bottom are interpolated between the corners,
+//! and the coordinates of its pixels between top and bottom. Every division by a length is a shift.
 //!
 //! Corners outside the polygon still lie in its plane, and may lie outside the texture. They are not clamped,
 //! since that would bend the tile. The spans are clamped where they cross the border.

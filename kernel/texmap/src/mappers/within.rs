@@ -14,9 +14,10 @@
 //!
 //! Quadratic pieces are not among the ways. A quadratic piece of 16 pixels costs more than 16 quotients, and
 //! a piece of 32 pixels three quarters as much as 32 quotients, while lines of eight pixels cost a third. So
-//! a quadratic could help only where such lines err too much and such a curve does not, which is where the
-//! depth changes by less than a third over the curve. In random faces that is at most 1 % of the pixels for
-//! errors down to 1/16 texel, and 7 % for 1/256 texel (`tests/within.rs` prints the shares and checks them).
+//! a quadratic could help only where the error of such lines is too large and the error of such a curve is
+//! not, which is where the depth changes by less than a third over the curve. In random faces that is at most
+//! 1 % of the pixels for errors down to 1/16 texel, and 7 % for 1/256 texel (`tests/within.rs` prints the
+//! shares and checks them).
 //!
 //! # One affine map
 //!
@@ -304,7 +305,8 @@ impl Within {
             tolerance,
             by,
         } = self;
-        // A span that is at least as long as one that failed to be a line is not tried: neighbours are alike.
+        // A span that is at least as long as a span that failed to be a line is not tried: neighbours are
+        // alike.
         let mut too_long = u16::MAX;
         move |span| {
             let axis = match by {
