@@ -79,12 +79,12 @@ pub fn sleep_while(idle: impl FnOnce() -> bool) {
     }
 }
 
-/// Runs `work` with interrupts off.
+/// Calls `work` with interrupts off, and returns its result.
 pub fn undisturbed<T>(work: impl FnOnce() -> T) -> T {
     x86_64::instructions::interrupts::without_interrupts(work)
 }
 
-/// Ends QEMU with `exit`'s code. A machine without QEMU's exit device stops for good.
+/// Ends QEMU with `exit`'s code. A machine without QEMU's exit device halts for good.
 pub fn exit(exit: Exit) -> ! {
     // SAFETY: on a PC no device except QEMU's exit device answers at this port.
     unsafe { ports::out32(Exit::PORT, exit as u32) };

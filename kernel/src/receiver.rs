@@ -1,4 +1,4 @@
-//! The way of received bytes from the UART to the program.
+//! The receiver: it moves bytes from the UART to the program.
 //!
 //! The UART's FIFO holds 16 bytes, which arrive in 1.4 ms at 115 200 baud; drawing a frame takes longer. So
 //! the interrupt handler moves the bytes from the FIFO into a [`Ring`], which the program empties between
@@ -8,7 +8,7 @@
 //! program switches it on again when half of the ring is free. QEMU holds back the bytes that follow, so
 //! nothing is lost. A real UART overruns its FIFO and reports that.
 //!
-//! A line with a lost or damaged byte must never be carried out, not even the half of it that arrived.
+//! A line with a lost or damaged byte must never be carried out, not even the part of it that arrived.
 //! [`Received::damaged`] marks the bytes that may be next to a loss.
 
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
@@ -50,7 +50,7 @@ pub struct Received {
     pub damaged: bool,
 }
 
-/// A ring of `SIZE` bytes behind a UART, and counters of what went wrong.
+/// A ring of `SIZE` bytes behind a UART, and counters of its errors.
 #[derive(Debug)]
 pub struct Receiver<const SIZE: usize> {
     ring: Ring<SIZE>,
@@ -77,8 +77,8 @@ impl<const SIZE: usize> Receiver<SIZE> {
     }
 
     /// The interrupt handler's part: moves bytes from the FIFO into the ring, until the FIFO is empty or the
-    /// ring is full. It must go that far, because the interrupt controller sees only the edge at which the
-    /// UART's request begins.
+    /// ring is full. It must not stop earlier, because the interrupt controller sees only the edge at which
+    /// the UART's request begins.
     pub fn handle_interrupt(&self, uart: &mut impl Uart) {
         // Check for a full ring first: reading Line Status clears the errors of the next byte.
         while !self.ring.is_full() {
@@ -122,9 +122,9 @@ impl<const SIZE: usize> Receiver<SIZE> {
         !self.ring.is_empty()
     }
 
-    /// Returns whether the transmitter accepts bytes. Senders must ask here, because reading Line Status
-    /// clears its errors. Called with interrupts off, so that the handler moves no byte between the read and
-    /// the count of its errors.
+    /// Returns whether the transmitter accepts bytes. Senders must call this function and not read Line
+    /// Status, because the read clears the error bits. Called with interrupts off, so that the handler moves
+    /// no byte between the read and the count of its errors.
     pub fn can_send(&self, uart: &mut impl Uart) -> bool {
         let status = uart.line_status();
         self.count_errors(status);
@@ -135,9 +135,9 @@ impl<const SIZE: usize> Receiver<SIZE> {
     fn count_errors(&self, status: u8) {
         if status & OVERRUN != 0 {
             self.overruns.fetch_add(1, Ordering::Relaxed);
-            // The FIFO was full when the byte was lost, and no byte was removed from it since. The gap is
-            // therefore after the bytes that the FIFO holds and before the byte that follows. A UART without
-            // a FIFO lost the byte before its next byte. All of these bytes are marked.
+            // The FIFO was full when the byte was lost, and no byte has been removed from it since. The gap
+            // is therefore after the bytes that the FIFO holds and before the byte that follows. A UART
+            // without a FIFO lost the byte before its next byte. All of these bytes are marked.
             self.suspect.store(FIFO + 1, Ordering::Relaxed);
         }
         if status & DAMAGED != 0 {
@@ -195,7 +195,7 @@ mod tests {
             }
         }
 
-        /// A byte arrives on the wire, with `errors` in the bits of Line Status.
+        /// Lets a byte arrive on the wire, with `errors` in the bits of Line Status.
         fn arrive(&mut self, byte: u8, errors: u8) {
             if self.fifo.len() < usize::from(FIFO) {
                 self.fifo.push_back((byte, errors));

@@ -2,8 +2,8 @@
 
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 
-/// A queue of up to `SIZE` items for a single producer and a single consumer. `SIZE` is a power of
-/// two, so that the two counters may wrap.
+/// A queue of up to `SIZE` items for a single producer and a single consumer. `SIZE` is a power of two, so
+/// that the two counters may wrap.
 ///
 /// The producer is an interrupt handler and the consumer is the program that it interrupts, or they are two
 /// threads: neither waits for the other. The ring keeps its order only if one caller at a time calls

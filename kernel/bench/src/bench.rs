@@ -23,13 +23,13 @@ pub const LENGTHS: [u16; 16] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 12
 const MAX_JOBS: usize = 8192;
 /// The value that the bare loops store.
 const BARE: u8 = 0x55;
-/// Instructions that the clock is calibrated with.
+/// The number of instructions that calibrate the clock.
 const KNOWN: u32 = 4_000_000;
 
 /// A sink for an answer's lines, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
-/// The clock that measures how long work takes, and what is known of the CPU.
+/// The clock that measures the work, and the features of the CPU.
 #[derive(Clone, Copy, Debug)]
 pub struct Clock {
     /// Returns the time in ticks. The compiler must move no memory access across a call.
@@ -40,7 +40,7 @@ pub struct Clock {
     pub bmi2: bool,
 }
 
-/// The fixed memory of the bench, about 2.5 MiB. It is zero at first and meant for a static, which then
+/// The fixed memory of the bench, about 3.5 MiB. It is zero at first and meant for a static, which then
 /// occupies no space in an image.
 #[derive(Clone, Copy, Debug)]
 pub struct BenchMemory {
@@ -149,12 +149,12 @@ impl<'a, B: Bus> Bench<'a, B> {
         }
     }
 
-    /// Carries a request out, and then writes its answer.
+    /// Carries out a request, and then writes its answer.
     pub fn answer(&mut self, request: BenchRequest, clock: &Clock, out: &mut Out<'_>) {
         match request {
             BenchRequest::Calibrate => {
                 let measure = |count| ticks(clock.now, &mut || (clock.instructions)(count));
-                // Runs once to warm up. The difference of two counts cancels the cost of the call.
+                // The first call is a warm-up. The difference of two counts cancels the cost of the call.
                 measure(KNOWN);
                 let [more, less] = [2 * KNOWN, KNOWN].map(measure);
                 out(format_args!(
@@ -222,7 +222,7 @@ impl<'a, B: Bus> Bench<'a, B> {
         }
     }
 
-    /// Does a piece of work, and returns the ticks that it needed.
+    /// Does a piece of work, and returns how many ticks it lasted.
     ///
     /// # Panics
     /// If the mapper drops a face.
@@ -421,8 +421,8 @@ fn pairs(work: Work) -> u64 {
     }
 }
 
-/// Returns the ticks from before the work to after it, including a pair of clock reads. It is never inlined
-/// and the compiler does not know the work, so the same two calls surround every piece of work.
+/// Returns the ticks from before the work to after it, including a pair of clock reads. The function is never
+/// inlined, and the compiler does not know the work, so the same two calls surround every piece of work.
 #[inline(never)]
 fn ticks(now: fn() -> u64, work: &mut dyn FnMut()) -> u64 {
     let work = black_box(work);

@@ -50,7 +50,7 @@ impl BenchRequest {
     /// Parses a line, and checks its checksum if it has one.
     ///
     /// # Errors
-    /// The line is not a request.
+    /// If the line is not a request.
     pub fn parse(line: &str) -> Result<Self, BenchRequestError> {
         let text = match without_checksum(line) {
             Ok(text) => text,

@@ -5,14 +5,14 @@ use strum::{Display, VariantArray};
 /// A piece of work. It can be repeated, and each repetition carries out the same instructions.
 ///
 /// The variants are in the order of a round. Work that fills the whole screen of the card comes before
-/// [`Work::Present`], whose preparation puts the ball on every page. So the work on the ball that follows
+/// [`Work::Present`], whose preparation draws the ball on every page. The work on the ball comes last, so it
 /// erases only the ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Display, VariantArray)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Work {
     /// Store a constant in every pixel of the screen in RAM, column by column.
     BareRam,
-    /// The same on the card, with a write to Map Mask for each column: the cost of byte stores alone.
+    /// Do the same on the card, with a write to Map Mask for each column: the cost of byte stores alone.
     BareCard,
     /// Make the jobs of the one face that fills the screen.
     ScreenJobs,
@@ -20,18 +20,17 @@ pub enum Work {
     ScreenRam,
     /// Draw these jobs on the card.
     ScreenCard,
-    /// Present the ball's frame from RAM, where it was drawn before: eight bytes a store, plane by plane,
-    /// nothing else.
+    /// Present the ball's frame from RAM, where it was drawn before: eight bytes a store, plane by plane.
     Present,
     /// Erase, draw the ball on the card, and flip.
     FrameCard,
-    /// The part of drawing the ball that comes before the mapper: turning, clipping, light.
+    /// Do the part of drawing the ball that comes before the mapper: turning, clipping, light.
     FrameFaces,
-    /// The same, and make the jobs of the faces.
+    /// Do the same, and make the jobs of the faces.
     FrameJobs,
-    /// The same, and draw the jobs on the card: everything except erasing and flipping.
+    /// Do the same, and draw the jobs on the card: everything except erasing and flipping.
     FrameDrawCard,
-    /// The same in RAM.
+    /// Do the same in RAM.
     FrameDrawRam,
     /// Erase and draw the ball in RAM, present the frame, and flip.
     FramePresented,
@@ -58,7 +57,7 @@ impl Work {
     ///
     /// [`Work::Present`], [`Work::FrameCard`] and [`Work::FramePresented`] draw two frames and flip after
     /// each: with three pages in rotation, every second frame waits for a retrace, so two frames together
-    /// always need the same time.
+    /// always last equally long.
     pub fn frames(self) -> u32 {
         match self {
             Self::Present | Self::FrameCard | Self::FramePresented => 2,

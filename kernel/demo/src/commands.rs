@@ -1,4 +1,4 @@
-//! Commands: what each does, and why one is refused. The answers' lines are in `answers.rs`.
+//! Commands: what each command does, and the reasons for a refusal. The answers' lines are in `answers.rs`.
 
 use core::fmt;
 
@@ -18,13 +18,13 @@ pub(crate) enum Refusal {
     Name(UnknownName),
     /// The distance of this frame is out of range.
     Distance(FrameName),
-    /// A motion changes this distance to one that is out of range.
+    /// A motion changes this distance to a distance that is out of range.
     Motion(i32),
-    /// `steer` with a tick while the demo is running.
+    /// `steer` was sent with a tick while the demo is running.
     TickWhileRunning,
-    /// `steer` without a tick while the demo is held.
+    /// `steer` was sent without a tick while the demo is held.
     NoTickWhileHeld,
-    /// An action of the overlay while the demo is held.
+    /// An action of the overlay was sent while the demo is held.
     OverlayWhileHeld,
     /// The change cannot be added to the log.
     Log(LogError),
@@ -70,7 +70,7 @@ impl fmt::Display for Refusal {
 }
 
 impl<B: Bus> Demo<'_, B> {
-    /// Carries a command out and writes its answer.
+    /// Carries out a command and writes its answer.
     pub fn obey(&mut self, command: Command, tick: u32, out: &mut Out<'_>) -> Option<Request> {
         if let Command::Fail(kind) = command {
             return Some(Request::Fail(kind));
@@ -87,14 +87,14 @@ impl<B: Bus> Demo<'_, B> {
         }
     }
 
-    /// Carries a command out and writes its answer, without the last line.
+    /// Carries out a command and writes its answer, without the last line.
     fn carry_out(&mut self, command: Command, tick: u32, out: &mut Out<'_>) -> Result<(), Refusal> {
         match command {
             Command::Hold => {
                 let scenes = self.state.scenes;
                 let state = State::new(scenes, scenes.default());
                 self.log.restart(state);
-                // The reset serves both, whatever they return.
+                // One reset serves both calls, whatever they return.
                 let _ = (self.set_state(state), self.stop());
                 self.presentation.reset();
             }
@@ -148,7 +148,7 @@ impl<B: Bus> Demo<'_, B> {
         Ok(())
     }
 
-    /// Shows the frame that the log gives for a tick.
+    /// Shows the frame that the log defines for a tick.
     fn show_at(&mut self, tick: u32) -> Result<(), Refusal> {
         let state = self.log.state(tick).ok_or(Refusal::LostChanges(tick))?;
         let was_running = self.stop();

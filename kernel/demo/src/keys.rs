@@ -18,7 +18,7 @@ use protocol::Action;
 pub struct Key {
     /// The key's name, for people.
     pub name: &'static str,
-    /// The key, and a second key with the same action. They are equal if no second key exists.
+    /// The key, and a second key with the same action. The two are equal if no second key exists.
     codes: [KeyCode; 2],
     /// What the key does.
     pub action: Action,
@@ -100,7 +100,7 @@ impl Keyboard {
         }
     }
 
-    /// Handles a code. Returns the action if the code completes a push that has one.
+    /// Handles a code. Returns the action if the code completes a push of a key that has an action.
     pub fn push(&mut self, code: u8) -> Option<Action> {
         // An invalid code is ignored; the decoder starts again with the next code.
         let event = self.set.advance_state(code).ok()??;
@@ -156,8 +156,8 @@ mod tests {
         let all = codes.len();
         codes.sort();
         codes.dedup();
-        let twins = KEYS.iter().filter(|key| key.codes[0] == key.codes[1]);
-        assert_eq!(codes.len(), all - twins.count());
+        let single = KEYS.iter().filter(|key| key.codes[0] == key.codes[1]);
+        assert_eq!(codes.len(), all - single.count());
         // Every code fits a bit of `Keyboard::down`.
         assert!((KeyCode::Unknown as u8) < 128);
     }
@@ -184,7 +184,7 @@ mod tests {
             actions(&mut keyboard, &[M, M, M | UP, M]),
             [Action::NextMapper; 2]
         );
-        // A prefix was lost, on either side: keypad 4 has no action, and neither has E0 M.
+        // The prefix E0 was lost, or M got one by a loss: keypad 4 has no action, and neither has E0 M.
         let mut keyboard = Keyboard::new();
         assert_eq!(
             actions(&mut keyboard, &[LEFT, LEFT | UP, EXTENDED, M, M]),

@@ -78,7 +78,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 /// A sink for an answer's lines, each without its checksum.
 pub type Out<'a> = dyn FnMut(fmt::Arguments<'_>) + 'a;
 
-/// The fixed memory of the demo, about 2.5 MiB. It is meant for a static.
+/// The fixed memory of the demo, about 3.2 MiB. It is meant for a static.
 #[derive(Clone, Copy, Debug)]
 pub struct DemoMemory {
     model: Arena,
@@ -158,7 +158,7 @@ impl Input {
 #[derive(Debug)]
 pub struct Demo<'a, B> {
     presentation: Presentation<'a, B>,
-    /// The state that the next frame depends on; `log` says how it came about.
+    /// The state that the next frame depends on; `log` has the changes that led to it.
     state: State<'a>,
     log: Log<'a>,
     overlay: Overlay<'a>,
@@ -171,8 +171,8 @@ pub struct Demo<'a, B> {
 
 impl<'a, B: Bus> Demo<'a, B> {
     /// Paints the default scene into `memory`, sets the card's mode, and starts a running demo. The model of
-    /// `model_file` becomes a scene beside the built-in ones, and the default. Without a model file, the ball
-    /// is the default.
+    /// `model_file` becomes a scene beside the built-in scenes, and the default. Without a model file, the
+    /// ball is the default.
     ///
     /// # Errors
     /// As [`ModeX::set`](modex::ModeX::set): nothing can be drawn on this card.
@@ -225,7 +225,7 @@ impl<'a, B: Bus> Demo<'a, B> {
         }
     }
 
-    /// Adds the microseconds that the last frame needed. Only the machine has a clock for that.
+    /// Adds the duration of the last frame, in microseconds. Only the machine has a clock for that.
     pub fn add_frame_time(&mut self, micros: u32) {
         self.overlay.add_frame_time(micros);
     }
@@ -256,7 +256,7 @@ impl<'a, B: Bus> Demo<'a, B> {
         self.input.lines.damage();
     }
 
-    /// Handles a byte from the serial line. A byte that ends a line carries the line's command out.
+    /// Handles a byte from the serial line. If the byte ends a line, carries out the line's command.
     pub fn receive(&mut self, byte: u8, tick: u32, out: &mut Out<'_>) -> Option<Request> {
         let command = match self.input.lines.push(byte)? {
             Ok(line) => Command::parse(line),
@@ -327,7 +327,7 @@ impl<'a, B: Bus> Demo<'a, B> {
     }
 
     /// Stops the demo. Returns whether it ran; the caller must then reset the presentation, so that later
-    /// frames depend on the commands alone, and not on how far the demo had come.
+    /// frames depend on the commands alone, and not on how far the demo had run.
     #[must_use]
     fn stop(&mut self) -> bool {
         self.overlay.close();

@@ -29,14 +29,14 @@ pub(crate) struct Log<'a> {
     start: State<'a>,
     entries: &'a mut LogMemory,
     len: usize,
-    /// Changes that took effect and did not fit in the log.
+    /// The number of changes that took effect and did not fit in the log.
     lost: u32,
 }
 
 /// Why a change cannot be added to the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum LogError {
-    /// Its tick is before the tick of the last change, which is this.
+    /// Its tick is before this tick, the tick of the last change.
     Before(u32),
     /// The log is full.
     Full,
@@ -90,7 +90,7 @@ impl<'a> Log<'a> {
     /// Adds a change.
     ///
     /// # Errors
-    /// The tick is before that of the last change, or the log is full.
+    /// If the tick is before the tick of the last change, or if the log is full.
     pub fn add(&mut self, tick: u32, change: StateChange) -> Result<(), LogError> {
         let last = self.changes().last().map(|(tick, _)| tick);
         if let Some(last) = last.filter(|&last| tick < last) {
@@ -102,8 +102,8 @@ impl<'a> Log<'a> {
         Ok(())
     }
 
-    /// Adds a change that took effect, or counts it as lost if it cannot be added. That also happens when the
-    /// tick counter wraps, after 828 days.
+    /// Adds a change that took effect, or counts it as lost if it cannot be added. A change also counts as
+    /// lost when the tick counter wraps, after 828 days.
     pub fn add_or_count(&mut self, tick: u32, change: StateChange) {
         if self.add(tick, change).is_err() {
             self.lost = self.lost.saturating_add(1);

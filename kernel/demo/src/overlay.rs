@@ -1,7 +1,7 @@
 //! The overlay of a running demo: the list of keys, figures of the frames, and a hint.
 //!
-//! The overlay is drawn after the frame and counted separately. The pages know what they were drawn on, so
-//! nothing else has to remember where text was written.
+//! The overlay is drawn after the frame and counted separately. Each page records where it was drawn on, so
+//! no other code has to remember where text was written.
 //!
 //! The figures are those of the half second before; figures that changed with every frame would be illegible.
 //! A held demo has no overlay.
@@ -42,7 +42,7 @@ pub(crate) struct FrameStatistics {
     pub largest_error: u32,
 }
 
-/// A measuring interval: the frames since a tick, and the microseconds that they needed.
+/// A measuring interval: the frames since a tick, and the microseconds that drawing them lasted.
 #[derive(Clone, Copy, Debug, Default)]
 struct Interval {
     since: u32,
@@ -59,7 +59,7 @@ struct Rate {
     micros: u32,
 }
 
-/// What is drawn over the frames, and its timing.
+/// The overlay that is drawn over the frames, and its timing.
 #[derive(Debug)]
 pub(crate) struct Overlay<'a> {
     layer: &'a mut TextLayer,
@@ -126,7 +126,7 @@ impl<'a> Overlay<'a> {
         self.stale = true;
     }
 
-    /// Adds the microseconds that drawing a frame needed.
+    /// Adds the duration of drawing a frame, in microseconds.
     pub fn add_frame_time(&mut self, micros: u32) {
         self.interval.micros += u64::from(micros);
     }
@@ -142,7 +142,7 @@ impl<'a> Overlay<'a> {
         let ticks = tick.wrapping_sub(self.interval.since);
         if ticks >= UPDATE_TICKS {
             let Interval { frames, micros, .. } = self.interval;
-            // No rate after a long gap: the demo may just have begun.
+            // Show no rate after a long gap: the demo may just have begun.
             if frames > 0 && ticks < 100 * UPDATE_TICKS {
                 let tenths = frames * 10 * TICKS_PER_SECOND / ticks;
                 self.rate = Some(Rate {

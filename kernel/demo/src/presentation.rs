@@ -1,4 +1,4 @@
-//! The card, and what is drawn on it.
+//! Presentation: the card, and the frame that is drawn on it.
 
 use modex::{Bus, Counted, Destination, ModeX, Offscreen, Palette, SetError};
 use protocol::{FrameName, Motion};
@@ -13,7 +13,7 @@ use crate::overlay::Overlay;
 use crate::split::SplitView;
 use crate::steering::State;
 
-/// The frame on the screen: everything except the scene that a dump's header needs to draw it again.
+/// The frame on the screen: everything that a dump's header needs to draw it again, except the scene.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shown {
     pub frame: FrameName,
@@ -68,7 +68,8 @@ impl<'a, B: Bus> Presentation<'a, B> {
         self.renderer.palette()
     }
 
-    /// Replaces the scene. It has another palette and background, so a [`reset`](Self::reset) must follow.
+    /// Replaces the scene. The new scene may have another palette and background, so a [`reset`](Self::reset)
+    /// must follow.
     pub fn set_scene(&mut self, entry: &Entry<'a>) {
         self.renderer.set(entry.scene(&entry.paint(self.texels)));
         self.offscreen.forget();

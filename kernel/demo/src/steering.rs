@@ -57,7 +57,7 @@ impl<'a> Scenes<'a> {
     /// Resolves a change's name.
     ///
     /// # Errors
-    /// The name is unknown.
+    /// If the name is unknown.
     pub fn resolve(&self, change: Change) -> Result<StateChange, UnknownName> {
         let (setting, name) = match change {
             Change::Act(action) => return Ok(StateChange::Act(action)),
@@ -88,7 +88,7 @@ impl<'a> Scenes<'a> {
     }
 }
 
-/// The error that no value of a setting has this name.
+/// The error of a name that no value of a setting has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct UnknownName(pub Setting, pub Word);
 
@@ -421,7 +421,7 @@ pub(crate) mod tests {
     /// At any speed, the motion along tiles continues smoothly where the tiles repeat: no interpolated pose
     /// lies behind its neighbours, and no two consecutive poses are a tile apart.
     #[test]
-    fn a_walk_continues_smoothly_where_tiles_repeat() {
+    fn a_motion_continues_smoothly_where_tiles_repeat() {
         let mut state = state_of(0);
         while state.entry().name != "corridor" {
             act(&mut state, 0, Action::NextScene);

@@ -127,7 +127,7 @@ impl Trajectory {
         }
     }
 
-    /// Adds a push to one side to angle number `angle`.
+    /// Pushes angle number `angle` once more to one side.
     pub fn push(&mut self, angle: usize, side: i32) {
         self.pushes[angle] = (self.pushes[angle] + side).clamp(-MAX_PUSHES, MAX_PUSHES);
     }

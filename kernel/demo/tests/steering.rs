@@ -220,7 +220,7 @@ fn the_keys_command_lists_every_key() {
     );
 }
 
-/// The overlay needs four writes to Map Mask, and none if the frame is drawn in RAM first.
+/// The overlay needs four writes to Map Mask, and no write if the frame is drawn in RAM first.
 #[test]
 fn an_overlay_is_counted_separately_and_leaves_no_trace() {
     let mut memory = common::memory();

@@ -7,8 +7,8 @@ use texmap::TextureError;
 
 use crate::{MAX_BYTES, VERSION};
 
-/// Why bytes are not a model file that can be shown. Vertices, corners, faces and colours are numbered from
-/// 0.
+/// The reason why bytes are not a model file that can be shown. Vertices, corners, faces and colours are
+/// numbered from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ModelError {
     /// The bytes do not begin with [`crate::MAGIC`].

@@ -115,8 +115,8 @@ const _: () = assert!(
 );
 
 /// Largest difference of a normal's squared length from 2^28, that of a unit vector: rounding may change each
-/// part by one unit. The light raises a product with the normal to the 32nd power, and longer normals would
-/// overflow 64 bits.
+/// component by one unit. The light raises a product with the normal to the 32nd power, and longer normals
+/// would overflow 64 bits.
 const NORMAL_SLACK: i64 = 1 << 16;
 
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -230,12 +230,12 @@ impl<'p> ModelFile<'p> {
     /// Parses a model file, and checks all of it.
     ///
     /// # Errors
-    /// The first value that is not legal.
+    /// The reason that concerns the first value that is not legal.
     pub fn parse(bytes: &'p [u8]) -> Result<Self, ModelError> {
         if bytes.len() > MAX_BYTES {
             return Err(ModelError::TooLong(bytes.len()));
         }
-        // Check the magic first: bytes of another kind are reported as no model file, not as a short model
+        // Check the magic first, so that other bytes are reported as no model file and not as a short model
         // file.
         if !bytes.starts_with(&MAGIC) {
             return Err(ModelError::NotAModelFile);
@@ -624,10 +624,10 @@ mod tests {
         let model_file = ModelFile::parse(&bytes).unwrap();
         let mut arena = in_place::boxed!(Arena);
         let entry = model_file.entry(&mut arena);
-        let mut storage = in_place::boxed!(RenderMemory);
+        let mut memory = in_place::boxed!(RenderMemory);
         let mut painted = Box::new([0; scene::catalogue::MAX_TEXELS]);
         let textures = entry.paint(&mut painted);
-        let mut renderer = SceneRenderer::new(&mut storage, entry.scene(&textures));
+        let mut renderer = SceneRenderer::new(&mut memory, entry.scene(&textures));
         let pose = Pose {
             distance: Pose::MAX_DISTANCE,
             ..entry.pose(77)

@@ -19,16 +19,15 @@ pub enum Purpose {
 
 /// Port and video-memory access to a VGA.
 ///
-/// Reads take `&mut self`: reading a port of the VGA has side effects (3DA resets the attribute
-/// controller's flip-flop). Addresses are offsets into the window at A0000h. Their type wraps at 64
-/// KiB, as the card's addresses do. Accesses happen in program order. An implementation must not
-/// let the compiler move a store across a port write, because a port write decides where the store
-/// goes.
+/// Reads take `&mut self`: reading a port of the VGA has side effects (3DA resets the attribute controller's
+/// flip-flop). Addresses are offsets into the window at A0000h. Their type wraps at 64 KiB, as the card's
+/// addresses do. Accesses happen in program order. An implementation must not let the compiler move a store
+/// across a port write, because a port write decides where the store goes.
 pub trait Bus {
     /// Writes a byte to a port.
     fn out8(&mut self, port: u16, value: u8);
-    /// Writes a word to a port. On the index ports of sequencer, graphics controller and CRTC, the
-    /// low byte is the index and the high byte its data.
+    /// Writes a word to a port. On the index ports of sequencer, graphics controller and CRTC, the low byte
+    /// is the index and the high byte its data.
     fn out16(&mut self, port: u16, value: u16);
     /// Reads a byte from a port.
     fn in8(&mut self, port: u16) -> u8;
@@ -38,8 +37,8 @@ pub trait Bus {
     fn store64(&mut self, at: u16, bytes: u64);
     /// Loads the byte at `at` from the plane that Read Map selects. Fills all four latches.
     fn load8(&mut self, at: u16) -> u8;
-    /// Lends `draw` the `len` bytes at `at`, `at + STEP`, ..., and carries out its stores before
-    /// returning. All of the bytes lie inside the window.
+    /// Lends `draw` the `len` bytes at `at`, `at + STEP`, ..., and carries out its stores before returning.
+    /// All of the bytes lie inside the window.
     fn lane<const STEP: usize>(&mut self, at: u16, len: u16, draw: impl FnOnce(Lane<'_, STEP>));
     /// Announces the purpose of the following accesses.
     fn purpose(&mut self, _purpose: Purpose) {}

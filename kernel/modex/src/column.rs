@@ -17,13 +17,12 @@ pub trait Destination {
     /// Selects the plane of screen column `x`.
     fn select(&mut self, x: u16);
 
-    /// Lends `draw` the `len` pixels from (x, y) on, `STEP` bytes apart; their plane must be
-    /// selected. A `STEP` of [`STRIDE`] is a column, and a `STEP` of 1 is every fourth pixel of a
-    /// row.
+    /// Lends `draw` the `len` pixels from (x, y) on, `STEP` bytes apart; their plane must be selected. A
+    /// `STEP` of [`STRIDE`] is a column, and a `STEP` of 1 is every fourth pixel of a row.
     ///
     /// # Panics
-    /// If the lane is empty or leaves the 320x240 frame. Coverage never requests such a lane, and a
-    /// store outside the page would appear in another page.
+    /// If the lane is empty or leaves the 320x240 frame. Coverage never requests such a lane, and a store
+    /// outside the page would appear in another page.
     fn lane<const STEP: usize>(
         &mut self,
         x: u16,
@@ -41,8 +40,8 @@ pub trait Destination {
         self.lane(x, y, len, draw);
     }
 
-    /// Writes the `len` pixels from (x, y) to the right in order, and selects the plane for each;
-    /// `texel` is called once for each. The plane that is selected afterwards is unspecified.
+    /// Writes the `len` pixels from (x, y) to the right in order, and selects the plane for each; `texel` is
+    /// called once for each. The plane that is selected afterwards is unspecified.
     ///
     /// # Panics
     /// As [`Destination::lane`].
@@ -53,9 +52,9 @@ pub trait Destination {
         }
     }
 
-    /// Lends `draw` line `y` in RAM, then writes the `len` pixels from (x, y) to the right from it,
-    /// one plane after the other. `draw` must store to these pixels and to no others. The line's
-    /// initial contents and the plane that is selected afterwards are unspecified.
+    /// Lends `draw` line `y` in RAM, then writes the `len` pixels from (x, y) to the right from it, one plane
+    /// after the other. `draw` must store to these pixels and to no others. The line's initial contents and
+    /// the plane that is selected afterwards are unspecified.
     ///
     /// # Panics
     /// As [`Destination::lane`].
@@ -122,9 +121,9 @@ pub type Column<'a> = Lane<'a, STRIDE>;
 
 /// A lane: `len` bytes of one plane, a base and then every `STEP`th byte, open for writing once.
 ///
-/// This is the only type that stores to video memory one byte at a time. The stores are volatile:
-/// the compiler sees neither the card's planes nor the port writes that select them, and it has
-/// deleted a plain store as overwritten.
+/// This is the only type that stores to video memory one byte at a time. The stores are volatile: the
+/// compiler sees neither the card's planes nor the port writes that select them. It once deleted a plain
+/// store as overwritten.
 #[derive(Debug)]
 pub struct Lane<'a, const STEP: usize> {
     base: NonNull<u8>,
@@ -137,16 +136,16 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
     pub fn over(bytes: &'a mut [u8]) -> Self {
         let len = bytes.len().div_ceil(STEP);
         assert!(len <= usize::from(u16::MAX), "{len} pixels in a lane");
-        // SAFETY: the slice spans the lane from its first byte to its last, and its exclusive
-        // borrow lives as long as the lane.
+        // SAFETY: the slice spans the lane from its first byte to its last, and its exclusive borrow lives as
+        // long as the lane.
         unsafe { Self::new(NonNull::from(bytes).cast(), len as u16) }
     }
 
     /// Returns a lane of `len` bytes from `base`.
     ///
     /// # Safety
-    /// For as long as the lane lives, `base.add(i * STEP)` is valid for volatile writes of a byte
-    /// for every `i < len`, and nothing else reads or writes there.
+    /// For as long as the lane lives, `base.add(i * STEP)` is valid for volatile writes of a byte for every
+    /// `i < len`, and nothing else reads or writes there.
     pub unsafe fn new(base: NonNull<u8>, len: u16) -> Self {
         Self {
             base,
@@ -165,8 +164,8 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         self.len == 0
     }
 
-    /// Returns the address of the first byte. The contract of [`Lane::new`] holds as long as the
-    /// lane lives: a tuned loop writes to the lane's bytes, volatile, and nowhere else.
+    /// Returns the address of the first byte. The contract of [`Lane::new`] holds as long as the lane lives:
+    /// a tuned loop writes to the lane's bytes, volatile, and nowhere else.
     pub fn as_ptr(&mut self) -> *mut u8 {
         self.base.as_ptr()
     }
@@ -225,8 +224,8 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         (first, second)
     }
 
-    /// Returns lanes of `pixels` pixels each, from the first pixel on. Pixels at the end that do
-    /// not fill a lane are left out.
+    /// Returns lanes of `pixels` pixels each, from the first pixel on. Pixels at the end that do not fill a
+    /// lane are left out.
     ///
     /// # Panics
     /// If `pixels` is 0.
@@ -237,9 +236,8 @@ impl<'a, const STEP: usize> Lane<'a, STEP> {
         (0..usize::from(len / pixels) * step)
             .step_by(step)
             .map(move |offset| {
-                // SAFETY: this many lanes fit in the length, so by the contract of `new` the
-                // address is inside, and so are the `pixels` pixels from there on, which are in no
-                // other lane.
+                // SAFETY: this many lanes fit in the length, so by the contract of `new` the address is
+                // inside, and so are the `pixels` pixels from there on, which are in no other lane.
                 let base = unsafe { base.add(offset) };
                 let len = pixels;
                 Self { base, len, lent }

@@ -9,9 +9,9 @@ pub(crate) const GROUP_BYTES: usize = 8;
 const GROUPS: usize = STRIDE / GROUP_BYTES;
 const GROUP_PIXELS: u16 = 4 * GROUP_BYTES as u16;
 
-/// The parts of a page that were drawn on since the page last held the bare background: for each
-/// group of 32 pixel columns, the lines from a top to a bottom. Both records only grow, and start
-/// at zero, so a lane is added without testing whether its group had any.
+/// The parts of a page that were drawn on since the page last held the bare background: for each group of 32
+/// pixel columns, the lines from a top to a bottom. Both records only grow, and start at zero, so a lane is
+/// added without a test whether its group already has lines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Drawn {
     /// Lines from the top to the page's end.
@@ -21,7 +21,7 @@ pub(crate) struct Drawn {
 }
 
 impl Drawn {
-    /// All zeros, so that a value that begins with it takes no space in the kernel's image.
+    /// Nothing drawn. All zeros, so that a value that contains it occupies no space in the kernel's image.
     pub(crate) const NOTHING: Self = Self {
         rise: [0; GROUPS],
         bottom: [0; GROUPS],

@@ -14,14 +14,14 @@ pub type Rgb6 = [u8; 3];
 /// The DAC's 256 entries.
 pub type Palette = [Rgb6; 256];
 
-/// Reads of Input Status 1 before the driver reports that the card does not respond. They take
-/// seconds, while a refresh takes 17 ms.
+/// Reads of Input Status 1 before the driver reports that the card does not respond. They last some seconds;
+/// a refresh lasts 17 ms.
 const POLLS: u32 = 10_000_000;
 
 /// The reason why Mode X could not be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SetError {
-    /// A register reads back another value than the one written.
+    /// A register reads back a value that differs from the written value.
     Register {
         /// The block, as [`Mode::blocks`] names it.
         block: &'static str,
@@ -32,9 +32,9 @@ pub enum SetError {
         /// The value that the card returned.
         actual: u8,
     },
-    /// The window at A0000h is not four planes of 64 KiB: a byte of a plane does not hold the value
-    /// that was stored through Map Mask. RAM in place of the window fails this way, because it
-    /// keeps one byte where the card keeps four.
+    /// The window at A0000h is not four planes of 64 KiB: a byte of a plane does not hold the value that was
+    /// stored through Map Mask. RAM in place of the window fails this way, because it keeps one byte where
+    /// the card keeps four.
     Plane {
         /// The plane, 0 to 3.
         plane: u8,
@@ -103,23 +103,21 @@ impl core::error::Error for SetError {}
 ///
 /// # Why nothing tears
 ///
-/// The pages share the low byte of their start address, so a flip is a single write of one byte: at
-/// any moment the CRTC has the address of one page or of the other. The CRTC latches the start
-/// address once per refresh. The moment differs from card to card, but it always lies after the
-/// last displayed line and before the first line of the next refresh.
+/// The pages share the low byte of their start address, so a flip is a single write of one byte: at any
+/// moment the CRTC has the address of one page or of the other. The CRTC latches the start address once per
+/// refresh. The moment differs from card to card, but it always lies after the last displayed line and before
+/// the first line of the next refresh.
 ///
 /// [`ModeX::flip`] writes the address at any time. After that write, [`ModeX::settle`] reads Input
-/// Status 1: first until the card displays (at a time A), then until the card is in the vertical
-/// retrace (at a later time B). The end of a refresh's display lies between A and B. The latch that
-/// follows this end comes after A, so after the write, and gets the new page. No line of the old
-/// page is shown between the end of the display and that latch, or ever after. So from B on the old
-/// page is free.
+/// Status 1: first until the card displays (at a time A), then until the card is in the vertical retrace (at
+/// a later time B). The end of a refresh's display lies between A and B. The latch that follows this end
+/// comes after A, so after the write, and gets the new page. No line of the old page is shown between the end
+/// of the display and that latch, or ever after. So from B on the old page is free.
 ///
-/// The argument needs no bound on any time: an interrupt between two accesses only makes A or B
-/// later. The other order, to see the card display and then to write, does need a bound: the driver
-/// may see the display on its last line, and its write may come after the latch, while the retrace
-/// that it then waits for has already begun. It would draw on the old page while the card shows
-/// that page for another refresh.
+/// The argument needs no bound on any time: an interrupt between two accesses only makes A or B later. The
+/// other order, to see the display first and then write, would need a bound: the driver may see the display
+/// on its last line, and its write may come after the latch, while the retrace that it then waits for has
+/// already begun. It would draw on the old page while the card shows that page for another refresh.
 #[derive(Debug)]
 pub struct ModeX<B> {
     bus: B,
@@ -150,12 +148,12 @@ impl<B: Bus> ModeX<B> {
         Ok(card)
     }
 
-    /// Sets the mode, reads it back, proves that the window is planar, loads the palette and clears
-    /// all four planes; page 0 is shown. The result does not depend on the card's earlier state.
+    /// Sets the mode, reads it back, proves that the window is planar, loads the palette and clears all four
+    /// planes; page 0 is shown. The result does not depend on the card's earlier state.
     ///
     /// # Errors
-    /// The first register that reads back wrong, or the first byte of a plane that does; or a beam
-    /// that does not move.
+    /// If a register or a byte of a plane reads back wrong (the error names the first), or if the beam does
+    /// not move.
     pub fn reset(&mut self, palette: &Palette) -> Result<(), SetError> {
         let bus = &mut self.bus;
         bus.purpose(Purpose::Setup);
@@ -167,8 +165,8 @@ impl<B: Bus> ModeX<B> {
         for at in (0..PLANE_BYTES).step_by(GROUP_BYTES) {
             bus.store64(at as u16, 0);
         }
-        // Until the next refresh the CRTC displays from the old start address, where a page may lie
-        // that is drawn on next.
+        // Until the next refresh the CRTC displays from the old start address, and the page that is drawn on
+        // next may lie there.
         self.wait_for_frame().map_err(SetError::Beam)?;
         let bus = &mut self.bus;
         let clocking = MODE_X.sequencer[usize::from(CLOCKING_MODE)];
@@ -179,12 +177,10 @@ impl<B: Bus> ModeX<B> {
         Ok(())
     }
 
-    /// Returns the page after the page drawn last, on its bare background: `background[y]` is the
-    /// colour of line y. Waits first, as [`ModeX::settle`] does, if that page may still be on the
-    /// screen.
+    /// Returns the page after the page drawn last, on its bare background: `background[y]` is the colour of
+    /// line y. Waits first, as [`ModeX::settle`] does, if that page may still be on the screen.
     ///
-    /// Only the parts of the page that were drawn on are restored, in wide stores to all planes at
-    /// once.
+    /// Only the parts of the page that were drawn on are restored, in wide stores to all planes at once.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) -> Canvas<'_, B> {
         self.turn();
         self.bus.purpose(Purpose::Erase);
@@ -203,11 +199,10 @@ impl<B: Bus> ModeX<B> {
         }
     }
 
-    /// Moves to the page after the page drawn last, and waits until it cannot be on the screen any
-    /// more.
+    /// Moves to the page after the page drawn last, and waits until it cannot be on the screen any more.
     fn turn(&mut self) {
         self.back = (self.back + 1) % PAGES;
-        // This happens only after pages that were drawn without a flip: the front page is not free.
+        // Happens only after pages that were drawn without a flip. The front page is not free.
         if self.back == self.front {
             self.back = (self.front + 1) % PAGES;
         }
@@ -216,9 +211,9 @@ impl<B: Bus> ModeX<B> {
         }
     }
 
-    /// Copies `offscreen` to the page after the page drawn last, where both are on the same
-    /// background. Stores the parts that were drawn on in either, eight bytes at a time, plane by
-    /// plane. Waits as [`ModeX::begin`] does.
+    /// Copies `offscreen` to the page after the page drawn last, where both are on the same background.
+    /// Stores the parts that were drawn on in either, eight bytes at a time, plane by plane. Waits as
+    /// [`ModeX::begin`] does.
     pub fn present(&mut self, offscreen: &Offscreen) {
         self.turn();
         self.bus.purpose(Purpose::Draw);
@@ -279,8 +274,8 @@ impl<B: Bus> ModeX<B> {
         page_start(self.front) as u16
     }
 
-    /// Reads pixels back from the card: pixel i is in plane i & 3 at `at` + i / 4, which wraps
-    /// within the plane. Writes no byte of video memory.
+    /// Reads pixels back from the card: pixel i is in plane i & 3 at `at` + i / 4, which wraps within the
+    /// plane. Writes no byte of video memory.
     pub fn load(&mut self, at: u16, pixels: &mut [u8]) {
         self.bus.purpose(Purpose::Setup);
         for plane in 0..4 {
@@ -358,9 +353,8 @@ impl<B: Bus> Destination for Canvas<'_, B> {
         self.bus.lane(at as u16, len, draw);
     }
 
-    /// Writes the row with one Map Mask write and one store per pixel. The mask is kept twice in a
-    /// byte and rotated: the bit that arrives in bit 0 is the step of the address, from plane 3 to
-    /// plane 0.
+    /// Writes the row with one Map Mask write and one store per pixel. The mask is kept twice in a byte and
+    /// rotated: the bit that arrives in bit 0 is the step of the address, from plane 3 to plane 0.
     fn row(&mut self, x: u16, y: u16, len: u16, mut texel: impl FnMut() -> u8) {
         let last = check_row(x, y, len);
         self.drawn.add(x, last, y, y + 1);
@@ -384,12 +378,12 @@ fn write<B: Bus>(bus: &mut B, port: u16, index: u8, value: u8) {
     bus.out16(port, u16::from_le_bytes([index, value]));
 }
 
-/// Leaves the linear mode that the boot loader's VESA call left behind. No register of the plain
-/// VGA shows this mode.
+/// Leaves the linear mode that the boot loader's VESA call left behind. No register of the plain VGA shows
+/// this mode.
 ///
-/// While DISPI is enabled, QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card
-/// has no DISPI (its ID does not read B0Cx); while its SR7 bit 0 is set, stores go to linear memory
-/// and bypass Map Mask. On any other card, every register outside the plain VGA keeps its value.
+/// While DISPI is enabled, QEMU ignores the CRTC and scrambles planar writes. A Cirrus Logic card has no
+/// DISPI (its ID does not read B0Cx); while its SR7 bit 0 is set, stores go to linear memory and bypass Map
+/// Mask. On any other card, every register outside the plain VGA keeps its value.
 fn leave_linear_mode<B: Bus>(bus: &mut B) {
     bus.out16(DISPI_INDEX, DISPI_ID);
     if bus.in16(DISPI_DATA) & 0xFFF0 == 0xB0C0 {
@@ -403,16 +397,16 @@ fn leave_linear_mode<B: Bus>(bus: &mut B) {
     for (port, index) in CIRRUS_EXTENSIONS {
         write(bus, port, index, 0);
     }
-    // The card's DAC has a hidden register behind PEL Mask. It opens after four reads, and holds
-    // the colour depth of the linear mode.
+    // The card's DAC has a hidden register behind PEL Mask. It opens after four reads, and holds the colour
+    // depth of the linear mode.
     for _ in 0..4 {
         bus.in8(PEL_MASK);
     }
     bus.out8(PEL_MASK, 0);
 }
 
-/// Unlocks a Cirrus Logic card's own registers. Returns false for any other card, whose SR6 then
-/// has its old value again.
+/// Unlocks a Cirrus Logic card's own registers. Returns false for any other card, whose SR6 then has its old
+/// value again.
 ///
 /// A Cirrus answers a key with a value that was not written: after any value but the key, SR6 reads
 /// [`CIRRUS_LOCKED`], and after the key it reads the key. A register that simply holds the written
@@ -448,8 +442,7 @@ fn write_mode<B: Bus>(bus: &mut B, mode: &Mode) {
         write(bus, SEQUENCER, index, value | off);
     }
     write(bus, SEQUENCER, RESET, mode.sequencer[usize::from(RESET)]);
-    // While CR11 bit 7 is set, the card ignores writes to CR0-7. The table's own value sets it
-    // again.
+    // While CR11 bit 7 is set, the card ignores writes to CR0-7. The table's own value sets it again.
     let unprotected = mode.crtc[usize::from(VERTICAL_RETRACE_END)] & !PROTECT;
     write(bus, CRTC, VERTICAL_RETRACE_END, unprotected);
     for (index, &value) in (0..).zip(&mode.crtc) {
@@ -476,8 +469,7 @@ fn write_palette<B: Bus>(bus: &mut B, palette: &Palette) {
     }
 }
 
-/// Reads every register of the mode. The screen blanks while the attribute controller's palette is
-/// open.
+/// Reads every register of the mode. The screen blanks while the attribute controller's palette is open.
 fn read_mode<B: Bus>(bus: &mut B) -> Mode {
     let mut mode = Mode {
         misc: bus.in8(MISC_READ),
@@ -528,12 +520,12 @@ fn check_mode<B: Bus>(bus: &mut B, mode: &Mode) -> Result<(), SetError> {
     Ok(())
 }
 
-/// Proves that the window is four planes of 64 KiB: stores a different byte in each plane, at the
-/// start of each half of the window, through Map Mask, and loads each byte through Read Map. All
-/// eight bytes differ, so no plane can stand in for another plane, and neither half for the other.
+/// Proves that the window is four planes of 64 KiB: stores a different byte in each plane, at the start of
+/// each half of the window, through Map Mask, and loads each byte through Read Map. All eight bytes differ,
+/// so no plane can stand in for another plane, and neither half for the other.
 ///
-/// The registers prove nothing about the window: they read back correctly even while a machine
-/// shows RAM at A0000h.
+/// The registers prove nothing about the window: they read back correctly even while a machine shows RAM at
+/// A0000h.
 fn check_planes<B: Bus>(bus: &mut B) -> Result<(), SetError> {
     const HALVES: [u16; 2] = [0, (PLANE_BYTES / 2) as u16];
     let bytes = || {

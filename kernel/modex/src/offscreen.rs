@@ -6,8 +6,8 @@ use crate::{Destination, HEIGHT, Lane, Line, PlanarBuffer};
 
 /// A page in RAM that records where it was drawn on.
 ///
-/// Drawing on it costs no port writes, in any order of planes. [`ModeX::present`] then stores it
-/// eight bytes at a time, one plane after the other.
+/// Drawing on it costs no port writes, in any order of planes. [`ModeX::present`] then stores it eight bytes
+/// at a time, one plane after the other.
 ///
 /// [`ModeX::present`]: crate::ModeX::present
 #[derive(Clone, Copy, Debug)]
@@ -28,8 +28,8 @@ impl Offscreen {
         }
     }
 
-    /// Restores the bare background: `background[y]` is the colour of line y. Only the parts that
-    /// were drawn on are restored.
+    /// Restores the bare background: `background[y]` is the colour of line y. Only the parts that were drawn
+    /// on are restored.
     pub fn begin(&mut self, background: &[u8; HEIGHT]) {
         if !core::mem::replace(&mut self.painted, true) {
             self.drawn = Drawn::EVERYTHING;
@@ -42,8 +42,7 @@ impl Offscreen {
         }
     }
 
-    /// Makes the next [`Offscreen::begin`] paint the whole background, because the background has
-    /// changed.
+    /// Makes the next [`Offscreen::begin`] paint the whole background, because the background has changed.
     pub fn forget(&mut self) {
         self.painted = false;
     }

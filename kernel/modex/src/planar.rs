@@ -62,9 +62,9 @@ impl Destination for PlanarBuffer {
         let first = NonNull::from(&mut self.planes).cast::<u8>();
         // SAFETY: (x, y) is in the frame, so this is a byte of its plane.
         let base = unsafe { first.add((x & 3) * PAGE_BYTES + top * STRIDE + x / 4) };
-        // SAFETY: the last pixel is in the frame, too, and `STEP` bytes are a line down or four
-        // pixels right: the lane lies in the plane from its first byte to its last. The exclusive
-        // borrow of the planes lives until `draw` returns.
+        // SAFETY: the last pixel is in the frame, too, and `STEP` bytes are a line down or four pixels right:
+        // the lane lies in the plane from its first byte to its last. The exclusive borrow of the planes
+        // lives until `draw` returns.
         draw(unsafe { Lane::new(base, len) });
     }
 

@@ -1,7 +1,7 @@
 //! The datasheet: ports, indices, and Mode X as a table.
 //!
-//! Names are those of the FreeVGA pages. The values for 320x240 are the values on which every
-//! source of the mode agrees (527 lines in all, 59.71 Hz). Nothing here accesses a port.
+//! Names are those of the FreeVGA pages. The values for 320x240 are the values on which every source of the
+//! mode agrees (527 lines in all, 59.71 Hz). Nothing here accesses a port.
 
 /// Sequencer index port (SRX); its data port is one above.
 pub const SEQUENCER: u16 = 0x3C4;
@@ -37,15 +37,14 @@ pub const DISPI_ID: u16 = 0;
 /// DISPI index 4: enable.
 pub const DISPI_ENABLE: u16 = 4;
 
-/// SR6 of a Cirrus Logic card: unlocks the card's extensions, and reports whether they are
-/// unlocked.
+/// SR6 of a Cirrus Logic card: unlocks the card's extensions, and reports whether they are unlocked.
 pub const CIRRUS_UNLOCK: u8 = 0x06;
 /// Written to SR6, it unlocks the extensions; SR6 then reads this value.
 pub const CIRRUS_KEY: u8 = 0x12;
 /// Value that SR6 reads while the extensions are locked, after any value but the key was written.
 pub const CIRRUS_LOCKED: u8 = 0x0F;
-/// A Cirrus Logic card's own registers that must be zero in a plain VGA mode: SR7 Extended
-/// Sequencer Mode, GR9 and GRA (banks), GRB Mode Extensions, CR1A, CR1B, CR1D.
+/// A Cirrus Logic card's own registers that must be zero in a plain VGA mode: SR7 Extended Sequencer Mode,
+/// GR9 and GRA (banks), GRB Mode Extensions, CR1A, CR1B, CR1D.
 pub const CIRRUS_EXTENSIONS: [(u16, u8); 7] = [
     (SEQUENCER, 0x07),
     (GRAPHICS, 0x09),
@@ -85,8 +84,8 @@ pub const VERTICAL_RETRACE: u8 = 0x08;
 
 /// A mode: the value of every register after the mode is set.
 ///
-/// Arrays are indexed by register. Start address and Map Mask are included with the values that the
-/// mode set leaves; they change later.
+/// Arrays are indexed by register. Start address and Map Mask are included with the values that the mode set
+/// leaves; they change later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Mode {
     /// Miscellaneous Output.

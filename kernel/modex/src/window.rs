@@ -5,11 +5,11 @@ use core::ops::Range;
 use crate::column::{check_lane, check_row};
 use crate::{Destination, Lane, STRIDE, WIDTH};
 
-/// Some columns of a frame, shown at other columns of a destination. Pixels outside these columns
-/// are not drawn.
+/// Some columns of a frame, shown at other columns of a destination. Pixels outside these columns are not
+/// drawn.
 ///
-/// A window moves columns by whole addresses, four columns each, so every column keeps its plane.
-/// Code that draws by planes, or selects one plane for many columns, works unchanged.
+/// A window moves columns by whole addresses, four columns each, so every column keeps its plane. Code that
+/// draws by planes, or selects one plane for many columns, works unchanged.
 #[derive(Debug)]
 pub struct Window<'d, D> {
     destination: &'d mut D,
@@ -21,8 +21,8 @@ impl<'d, D: Destination> Window<'d, D> {
     /// Returns a window that shows the frame's `columns` from column `to` of `destination` on.
     ///
     /// # Panics
-    /// If the columns leave the frame on either side, or if they would move by a distance that is
-    /// not a multiple of four.
+    /// If the columns leave the frame on either side, or if they would move by a distance that is not a
+    /// multiple of four.
     pub fn new(destination: &'d mut D, columns: Range<u16>, to: u16) -> Self {
         let (width, frame) = (columns.end.saturating_sub(columns.start), WIDTH as u16);
         assert!(
@@ -38,7 +38,8 @@ impl<'d, D: Destination> Window<'d, D> {
         }
     }
 
-    /// Returns which of `len` pixels, `step` columns apart from column `x` on, are shown.
+    /// Returns which of `len` pixels are shown. The first is in column `x`, and they lie `step` columns
+    /// apart.
     fn shown(&self, x: u16, len: u16, step: u16) -> Range<u16> {
         let before = |column: u16| column.saturating_sub(x).div_ceil(step).min(len);
         before(self.columns.start)..before(self.columns.end)
@@ -75,8 +76,7 @@ impl<D: Destination> Destination for Window<'_, D> {
             let x = self.moved(x);
             self.destination.lane(x, y, len, draw);
         } else if !shown.is_empty() {
-            // `draw` has to begin at the first pixel, so draw the whole lane into RAM and copy the
-            // part.
+            // `draw` has to begin at the first pixel, so draw the whole lane into RAM and copy the part.
             let mut whole = [0; STRIDE];
             draw(Lane::over(&mut whole[..len.into()]));
             let part = &whole[usize::from(shown.start)..usize::from(shown.end)];

@@ -36,7 +36,7 @@ struct Recorder {
     window: Behind,
 }
 
-/// What a card has at SR6.
+/// The device behind SR6 of a card.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Sr6 {
     /// A Cirrus Logic card's lock: it reads 12h after a write of 12h, and 0Fh after any other value.
@@ -49,7 +49,7 @@ enum Sr6 {
     Fixed(u8),
 }
 
-/// What the window at A0000h shows.
+/// The device behind the window at A0000h.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Behind {
     /// Four planes of 64 KiB.
@@ -60,7 +60,7 @@ enum Behind {
     Nothing(u8),
     /// Four planes of 32 KiB, each of which appears twice.
     Half,
-    /// Planes of which every store reaches all.
+    /// Four planes, all of which every store reaches.
     Unmasked,
 }
 
@@ -80,7 +80,7 @@ impl Recorder {
         }
     }
 
-    /// The offset in each plane of a byte of the window.
+    /// Returns the offset in each plane of a byte of the window.
     fn place(&self, at: usize) -> usize {
         match self.window {
             Behind::Half => at % (PLANE_BYTES / 2),
@@ -203,7 +203,7 @@ fn position(log: &[Access], access: Access) -> usize {
 }
 
 #[test]
-fn the_mode_is_set_in_an_order_that_every_card_takes() {
+fn the_mode_is_set_in_an_order_that_every_card_accepts() {
     let mut recorder = Recorder::new();
     ModeX::set(&mut recorder, &BLACK).unwrap();
     let log = &recorder.log;
@@ -282,8 +282,8 @@ fn a_register_that_does_not_hold_is_named() {
         recorder.stuck = Some(stuck);
         let error = ModeX::set(&mut recorder, &BLACK).unwrap_err();
         let index = stuck.1;
-        let told = format!("{block} register {index:02X} reads 00 after");
-        assert!(error.to_string().starts_with(&told), "{error}");
+        let expected = format!("{block} register {index:02X} reads 00 after");
+        assert!(error.to_string().starts_with(&expected), "{error}");
     }
 }
 
@@ -312,7 +312,7 @@ fn a_window_that_is_not_planar_is_named() {
     }
 }
 
-/// A page's planes in the card, as a page in RAM.
+/// Returns a page's planes in the card, as a page in RAM.
 fn page(recorder: &Recorder, page: usize) -> PlanarBuffer {
     let mut buffer = PlanarBuffer::new();
     for (to, from) in buffer.planes.iter_mut().zip(&recorder.planes) {
@@ -442,7 +442,7 @@ fn a_page_that_may_be_on_the_screen_is_not_drawn_on() {
 
 #[test]
 #[should_panic(expected = "the card reports no display in 10000000 reads of Input Status 1, which")]
-fn a_dead_card_is_told_and_not_waited_for() {
+fn a_dead_card_is_reported_and_not_waited_for() {
     let mut recorder = Recorder::new();
     let mut card = ModeX::set(&mut recorder, &BLACK).unwrap();
     card.bus().status = vec![0xFF];
@@ -643,13 +643,13 @@ fn every_write_is_counted_once_for_its_purpose() {
         loads: 0,
     };
     assert_eq!(draw, tallies(1, 1, 100, 100));
-    // The first time the whole page, with 8 bytes a store.
+    // The first time, erasing covers the whole page, with 8 bytes a store.
     let page = PAGE_BYTES as u64;
     assert_eq!(erase, tallies(1, 1, page / 8, page));
     assert_eq!(overlay, tallies(1, 1, 10, 10));
     assert_eq!(flip, tallies(1, 0, 0, 0));
     // The rest belongs to the mode set, which clears all of the planes. The proof that they are planes needs
-    // a store and a load of eight bytes, with Map Mask before each store and once at its end.
+    // eight stores and eight loads of a byte, with Map Mask before each store and once at the end.
     let proof = 8;
     let planes = PLANE_BYTES as u64;
     let log = &counted.inner().log;

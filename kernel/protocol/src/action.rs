@@ -1,4 +1,4 @@
-//! Actions that steer a running demo, by a key or by `steer`.
+//! Actions that steer a running demo, by a key or by the command `steer`.
 
 use core::fmt;
 
@@ -13,41 +13,41 @@ use crate::{Setting, Word};
 pub enum Action {
     /// `yaw-left`: turn about the solid's own axis; the side towards the viewer moves to the left.
     YawLeft,
-    /// `yaw-right`
+    /// `yaw-right`: the opposite of `yaw-left`.
     YawRight,
     /// `pitch-up`: turn about the screen's horizontal axis; the side towards the viewer moves up.
     PitchUp,
-    /// `pitch-down`
+    /// `pitch-down`: the opposite of `pitch-up`.
     PitchDown,
     /// `roll-left`: turn about the line of sight; the top moves to the left.
     RollLeft,
-    /// `roll-right`
+    /// `roll-right`: the opposite of `roll-left`.
     RollRight,
     /// `faster`: speed up all motion; if nothing moves, start the scene's own motion.
     Faster,
     /// `slower`: slow down all motion.
     Slower,
-    /// `stop`: nothing moves.
+    /// `stop`: stop the scene's own motion and all turns.
     Stop,
     /// `pause`: stop all motion, or continue it.
     Pause,
     /// `step`: pause; if paused already, advance by one tick.
     Step,
-    /// `nearer`
+    /// `nearer`: move the solid towards the viewer.
     Nearer,
-    /// `farther`
+    /// `farther`: move the solid away from the viewer.
     Farther,
-    /// `next-scene`
+    /// `next-scene`: show the next scene in the list.
     NextScene,
-    /// `next-mapper`
+    /// `next-mapper`: use the next mapper in the list.
     NextMapper,
-    /// `last-mapper`: the mapper before this one in the list.
+    /// `last-mapper`: use the mapper before the current mapper in the list.
     LastMapper,
     /// `finer`: halve the error bound of `within-T`.
     Finer,
     /// `coarser`: double the error bound of `within-T`.
     Coarser,
-    /// `next-order`
+    /// `next-order`: use the next order in the list.
     NextOrder,
     /// `quality`: switch reduced quality on or off, for faces whose motion hides it.
     Quality,
@@ -57,9 +57,9 @@ pub enum Action {
     Info,
     /// `split`: switch the split view on or off: the frame as it is, the exact frame, and the error.
     Split,
-    /// `hint`: for five seconds, show which key is help.
+    /// `hint`: show for five seconds which key shows the help.
     Hint,
-    /// `reset`: the scene's own motion and the default settings. The scene stays.
+    /// `reset`: restore the scene's own motion and the default settings. The scene stays.
     Reset,
 }
 

@@ -17,10 +17,10 @@ pub enum Command {
     /// `show FRAME`: draw a frame on the next page, flip, and answer when the flip takes effect. A running
     /// demo is stopped first and keeps its settings.
     Show(FrameName),
-    /// `show FRAME motion MOTION`: the same in reduced quality, as for a solid with this motion per tick.
+    /// `show FRAME motion MOTION`: do the same in reduced quality, as for a solid with this motion per tick.
     ShowMoving(FrameName, Motion),
-    /// `show at TICK`: the same with the frame that the demo's log gives for a tick. Scene, mapper and order
-    /// are then those of that tick.
+    /// `show at TICK`: do the same with the frame that the demo's log defines for a tick. Scene, mapper and
+    /// order are then those of that tick.
     ShowAt(u32),
     /// `scene NAME`, `mapper NAME`, `order NAME`: change a setting from the next frame on. Without a name:
     /// list the values, and mark the current value.
@@ -188,7 +188,7 @@ impl FailKind {
     pub const ALL: &'static [Self] = Self::VARIANTS;
 }
 
-/// Each command's first word, and how the command is written.
+/// Each command's first word, and its usage as an error message prints it.
 ///
 /// Kept by hand, because the second column is prose. A test checks that each command is here.
 const USAGE: &[(&str, &str)] = &[
@@ -224,13 +224,13 @@ const USAGE: &[(&str, &str)] = &[
     ("leave", "'leave'"),
 ];
 
-/// Returns how a command is written, or `None` if no command begins with `word`.
+/// Returns the usage of a command, or `None` if no command begins with `word`.
 fn usage(word: &str) -> Option<&'static str> {
     let command = USAGE.iter().find(|(known, _)| *known == word);
     command.map(|&(_, usage)| usage)
 }
 
-/// Why a line is not a command.
+/// The reason why a line is not a command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CommandError<'a> {
     /// No command begins with this word.
@@ -266,7 +266,7 @@ impl Command {
     /// Parses a command, and checks its checksum if it has one.
     ///
     /// # Errors
-    /// The line is not a command.
+    /// If the line is not a command.
     pub fn parse(line: &str) -> Result<Self, CommandError<'_>> {
         let text = match without_checksum(line) {
             Ok(text) => text,

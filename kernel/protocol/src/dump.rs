@@ -31,8 +31,8 @@
 //! drawn in reduced quality, `motion` is the [`Motion`] that decided which; otherwise it is `none`. Before
 //! the first frame `mapper`, `frame` and `motion` are `none`.
 //!
-//! Version 4 had the words `pack` and `picture` for `model` and `frame`. Version 3 also had no line `motion`,
-//! and marked reduced quality by a `~` behind the mapper's name.
+//! Version 4 had the words `pack` and `picture` where version 5 has `model` and `frame`. Version 3 also had
+//! no line `motion`, and marked reduced quality by a `~` behind the mapper's name.
 //!
 //! Two dumps of the same frame on different pages differ only in their `start`.
 
@@ -64,7 +64,8 @@ pub struct Header<S> {
     pub mapper: Option<Word>,
     /// The frame on the screen; `None` before the first frame.
     pub frame: Option<FrameName>,
-    /// The motion that decided which faces are drawn in reduced quality; `None` if all have full quality.
+    /// The motion that decided which faces are drawn in reduced quality; `None` if all faces have full
+    /// quality.
     pub motion: Option<Motion>,
     /// The start address: where the displayed page begins in each plane.
     pub start: u16,
@@ -249,7 +250,8 @@ impl fmt::Display for Colours<'_> {
 struct Hex<'a>(&'a [u8]);
 
 impl fmt::Display for Hex<'_> {
-    /// Writes a chunk at a time: one write for each byte would be most of a dump's time.
+    /// Writes a chunk at a time: with one write for each byte, most of a dump's time would go into these
+    /// writes.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const DIGITS: &[u8; 16] = b"0123456789abcdef";
         for bytes in self.0.chunks(32) {

@@ -107,7 +107,7 @@ pub fn write_line(text: fmt::Arguments<'_>, send: impl FnMut(&[u8])) {
     writer.flush();
 }
 
-/// Why a line's checksum was not accepted.
+/// The reason why a line's checksum was not accepted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ChecksumError {
     /// The line has no ` *xxxxxxxx` at its end.
@@ -138,7 +138,7 @@ impl core::error::Error for ChecksumError {}
 /// Returns the text of a line that ends in its checksum.
 ///
 /// # Errors
-/// The checksum is missing or wrong.
+/// If the checksum is missing or wrong.
 pub fn without_checksum(line: &str) -> Result<&str, ChecksumError> {
     let (text, digits) = line.rsplit_once(" *").ok_or(ChecksumError::NoChecksum)?;
     let lower_hex = |b: u8| b.is_ascii_digit() || (b'a'..=b'f').contains(&b);

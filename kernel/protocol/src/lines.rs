@@ -21,7 +21,7 @@ pub struct Lines {
     damaged: bool,
 }
 
-/// Why a line was discarded.
+/// The reason why a line was discarded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LineError {
     /// The line is longer than [`MAX_LINE`].

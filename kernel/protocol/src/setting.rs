@@ -17,7 +17,7 @@ pub enum Setting {
     Order,
 }
 
-/// A name that only the program can interpret.
+/// A word of a command, such as the name of a scene, that only the demo can interpret.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Word {
     bytes: [u8; Self::MAX],

@@ -1,7 +1,7 @@
 //! The error view: a frame that shows each pixel's error in the place of its texel.
 //!
-//! The view asks the mapper itself for the coordinates of each pixel that it would draw, so it shows the
-//! errors of the frame, and of no model of the mapper.
+//! The view gets the coordinates of each pixel from the mapper that would draw it, so it shows the frame's
+//! true errors and not those of a model of the mapper.
 
 use core::ops::Range;
 
@@ -113,25 +113,26 @@ mod tests {
     use std::boxed::Box;
     use texmap::Mapper;
 
-    /// Calls `check` with a scene's entry and a stage of it.
-    fn staged(name: &str, check: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)) {
+    /// Calls `check` with a scene's entry and its renderer.
+    fn with_renderer(name: &str, check: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)) {
         let entry = CATALOGUE.iter().find(|entry| entry.name == name).unwrap();
         let mut texels = Box::new([0; MAX_TEXELS]);
         let textures = entry.paint(&mut texels);
-        let mut storage = in_place::boxed!(RenderMemory);
+        let mut memory = in_place::boxed!(RenderMemory);
         check(
             entry,
-            &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+            &mut SceneRenderer::new(&mut memory, entry.scene(&textures)),
         );
     }
 
-    /// The largest error of a frame. Every pixel of the solid has an error, and no other pixel has.
-    fn largest(stage: &mut SceneRenderer<'_>, mapper: &str, pose: &Pose) -> u32 {
+    /// Returns the largest error of a frame, after checking that exactly as many pixels have an error as the
+    /// solid has.
+    fn largest(renderer: &mut SceneRenderer<'_>, mapper: &str, pose: &Pose) -> u32 {
         let options = RenderOptions {
             mapper: Mapper::parse(mapper).unwrap(),
             ..RenderOptions::default()
         };
-        let mut posed = stage.at(pose);
+        let mut posed = renderer.at(pose);
         let mut drawn = Box::new(PlanarBuffer::new());
         let stats = posed.draw(options, &mut *drawn).stats;
         let mut page = Box::new(PlanarBuffer::new());
@@ -147,7 +148,7 @@ mod tests {
     /// `within-T` by at most T, and the exact mapper nowhere.
     #[test]
     fn errors_are_those_of_the_mapper() {
-        staged("tilted", |entry, stage| {
+        with_renderer("tilted", |entry, renderer| {
             for (name, least, most) in [
                 ("shifts", 48.0, 75.0),
                 ("row-steps", 30.0, 50.0),
@@ -156,7 +157,7 @@ mod tests {
                 ("free-direction", 0.0, 0.01),
                 ("exact", 0.0, 0.0),
             ] {
-                let texels = f64::from(largest(stage, name, &entry.pose(40))) / 65_536.0;
+                let texels = f64::from(largest(renderer, name, &entry.pose(40))) / 65_536.0;
                 assert!((least..=most).contains(&texels), "{name}: {texels}");
             }
         });
@@ -165,9 +166,12 @@ mod tests {
     /// A solid that hides parts of itself has errors at its visible pixels only.
     #[test]
     fn hidden_surfaces_have_no_error() {
-        staged("knot", |entry, stage| {
+        with_renderer("knot", |entry, renderer| {
             for name in ["shifts", "row-steps", "free-direction", "exact"] {
-                assert_eq!(largest(stage, name, &entry.pose(40)) == 0, name == "exact");
+                assert_eq!(
+                    largest(renderer, name, &entry.pose(40)) == 0,
+                    name == "exact"
+                );
             }
         });
     }

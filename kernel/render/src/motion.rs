@@ -76,12 +76,12 @@ impl PosedScene<'_> {
             let before = face.plane();
             let after = Plane::new(&change.anchors(&face.anchors), FOCAL_LENGTH);
             // A face outside the legal range is not visible.
-            let _ = spans(Axis::Down, face.polygon, |run| {
-                if run.line % GRID != GRID / 2 {
+            let _ = spans(Axis::Down, face.polygon, |span| {
+                if span.line % GRID != GRID / 2 {
                     return;
                 }
-                for y in (run.first..run.first + run.len).filter(|y| y % GRID == GRID / 2) {
-                    let x = run.line;
+                for y in (span.first..span.first + span.len).filter(|y| y % GRID == GRID / 2) {
+                    let x = span.line;
                     let seen = self
                         .visible
                         .is_none_or(|visible| visible.at(x, y) == Some(number));
@@ -105,8 +105,8 @@ impl PosedScene<'_> {
     }
 }
 
-/// How far the texture moves at a pixel: on the screen, in 16.16 pixels, and in the texture, in 16.16 texels.
-/// Returns `None` near a border of the texture, and where its slopes give no direction.
+/// Returns how far the texture moves at a pixel: on the screen, in 16.16 pixels, and in the texture, in 16.16
+/// texels. The result is `None` near a border of the texture, and where its slopes give no direction.
 fn sample(before: &Plane, after: &Plane, size: (u16, u16), x: u16, y: u16) -> Option<(u32, u32)> {
     let at = |plane: &Plane, x: u16, y: u16| {
         let c = plane.c.at(x, y);
@@ -125,7 +125,7 @@ fn sample(before: &Plane, after: &Plane, size: (u16, u16), x: u16, y: u16) -> Op
     let (moved_u, moved_v) = at(after, x, y)?;
     let (du, dv) = (moved_u - u, moved_v - v);
     let (ux, vx, uy, vy) = (right.0 - u, right.1 - v, down.0 - u, down.1 - v);
-    // All of them are below 2^24, so these are below 2^49.
+    // Each factor is below 2^24, so each result is below 2^49.
     let turn = ux * vy - uy * vx;
     let shift = |n: i64| {
         let shift = (i128::from(n) << 16).checked_div(i128::from(turn))?;
@@ -147,21 +147,21 @@ mod tests {
     use texmap::Mapper;
 
     /// Calls `check` with each scene's entry and a stage of it.
-    fn staged(mut check: impl FnMut(&Entry<'_>, &mut SceneRenderer<'_>)) {
+    fn with_renderers(mut check: impl FnMut(&Entry<'_>, &mut SceneRenderer<'_>)) {
         for entry in CATALOGUE {
             let mut texels = Box::new([0; MAX_TEXELS]);
             let textures = entry.paint(&mut texels);
-            let mut storage = in_place::boxed!(RenderMemory);
+            let mut memory = in_place::boxed!(RenderMemory);
             check(
                 entry,
-                &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+                &mut SceneRenderer::new(&mut memory, entry.scene(&textures)),
             );
         }
     }
 
-    /// The median motion, found another way: a ray from each pixel to the visible face, in floating point,
-    /// moves with the solid to its next place on the screen. The grid is finer.
-    fn median_by_rays(stage: &mut SceneRenderer<'_>, pose: &Pose, next: &Pose) -> f64 {
+    /// Returns the median motion, found another way: a ray from each pixel to the visible face, in floating
+    /// point, moves with the solid to its next place on the screen. The grid is finer.
+    fn median_by_rays(renderer: &mut SceneRenderer<'_>, pose: &Pose, next: &Pose) -> f64 {
         let rows = |pose: &Pose| {
             let orientation = pose.orientation();
             let columns = [0, 1, 2].map(|k| {
@@ -179,17 +179,17 @@ mod tests {
         let focal = f64::from(FOCAL_LENGTH);
         let mut faces = std::collections::HashMap::new();
         let mut at = std::collections::HashMap::new();
-        let posed = stage.at(pose);
+        let posed = renderer.at(pose);
         posed.faces(|number, face| {
             let Some(face) = face else { return };
             let [a, b, c] = face.anchors.map(|anchor| anchor.position.map(unit));
             let [u, v] = [b, c].map(|p| [0, 1, 2].map(|k| p[k] - a[k]));
             let normal = [1, 2, 0].map(|i| u[i] * v[(i + 1) % 3] - u[(i + 1) % 3] * v[i]);
             faces.insert(number, (normal, dot(normal, a)));
-            let _ = spans(Axis::Down, face.polygon, |run| {
-                for y in run.first..run.first + run.len {
-                    if run.line % 3 == 1 && y % 3 == 1 {
-                        at.entry((run.line, y)).or_insert(number);
+            let _ = spans(Axis::Down, face.polygon, |span| {
+                for y in span.first..span.first + span.len {
+                    if span.line % 3 == 1 && y % 3 == 1 {
+                        at.entry((span.line, y)).or_insert(number);
                     }
                 }
             });
@@ -222,19 +222,19 @@ mod tests {
         ways[ways.len() / 2]
     }
 
-    /// The default turn of each scene lies in the sweet spot, but for the scenes that sway. They stand still
-    /// at both ends of their way and are slow throughout: their floors and wall are there to be looked at,
-    /// not to turn.
+    /// The default turn of each scene lies in the sweet spot, except in the scenes that sway. These stand
+    /// still at both ends of their swing and move slowly between: their floors and wall are there to be
+    /// looked at, not to turn.
     #[test]
     fn the_default_turn_lies_in_the_sweet_spot() {
-        staged(|entry, stage| {
+        with_renderers(|entry, renderer| {
             let sways = ["grazing-16", "grazing-4096", "wall"].contains(&entry.name);
             let (mut pixels, mut ends) = (Vec::new(), Vec::new());
             for tick in (0..720).step_by(48) {
                 let (pose, next) = (entry.pose(tick), entry.pose(tick + 1));
-                let motion = stage.at(&pose).motion(&next).unwrap();
+                let motion = renderer.at(&pose).motion(&next).unwrap();
                 let found = f64::from(motion.pixels) / 65_536.0;
-                let rays = median_by_rays(stage, &pose, &next);
+                let rays = median_by_rays(renderer, &pose, &next);
                 let near = (found - rays).abs() < 0.03 + rays / 20.0;
                 assert!(near, "{} at {tick}: {found}, {rays} by rays", entry.name);
                 let Some((least, most)) = motion.sweet_spot(1 << 16, 60) else {
@@ -279,7 +279,7 @@ mod tests {
     /// A face that turns in its own plane keeps its quality with every mapper; a face that tumbles does not.
     #[test]
     fn a_face_that_moves_in_its_own_plane_keeps_its_quality() {
-        staged(|entry, stage| {
+        with_renderers(|entry, renderer| {
             let mut reduced = 0;
             for tick in (0..720).step_by(48) {
                 for name in ["exact", "within-1/4", "shifts", "row-steps", "linear-8"] {
@@ -292,7 +292,7 @@ mod tests {
                             ..RenderOptions::default()
                         };
                         let mut page = Box::new(modex::PlanarBuffer::new());
-                        let drawn = stage.draw(&pose, options, &mut *page);
+                        let drawn = renderer.draw(&pose, options, &mut *page);
                         (drawn.stats.pixels, drawn.reduced)
                     };
                     let (pixels, none) = draw(None);

@@ -1,16 +1,16 @@
 //! The period of a texture: how far it may move until it looks the same again.
 //!
 //! In a pattern of many periods the finest matter. The period here is that of the root mean square frequency
-//! along u or v, whichever is shorter. For a single wave it is the wave's period. Let d be the mean square
-//! difference between a texel and the next, and s the mean square difference between a texel and the mean. A
-//! wave of w radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
+//! along u or v, whichever is shorter. For a single wave this is the period of the wave. Let d be the mean
+//! square difference between a texel and the next, and s the mean square difference between a texel and the
+//! mean. A wave of w radians a texel has d / s = 4 sin^2(w / 2), and half its period is pi / w texels.
 
 use modex::Palette;
 use scene::trig::sin;
 use texmap::Texture;
 
-/// Half the period of a texture's root mean square frequency, 16.16 texels, at least 1. Returns `None` for a
-/// texture of one colour.
+/// Returns half the period of a texture's root mean square frequency, 16.16 texels, at least 1, or `None` for
+/// a texture of one colour.
 pub(crate) fn half_period(texture: &Texture<'_>, palette: &Palette) -> Option<u32> {
     let sides = texture
         .tile()

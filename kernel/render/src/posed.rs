@@ -77,7 +77,7 @@ impl<'r> PosedScene<'r> {
         self.faces.each(sink);
     }
 
-    /// The visible face at each pixel, or `None` if no face of the mesh can hide another.
+    /// Returns the visible face at each pixel, or `None` if no face of the mesh can hide another.
     pub fn visible(&self) -> Option<&Visible<MAX_FACES>> {
         self.visible
     }
@@ -159,9 +159,10 @@ impl FrontFaces<'_> {
     }
 }
 
-/// Whether the snapped polygon is wound clockwise on the screen (y down): a front face.
+/// Returns whether the snapped polygon is wound clockwise on the screen (y down), which makes it a front
+/// face.
 ///
-/// The snapped area decides, not the normal: the snapped polygon is what is drawn, and snapping may turn over
+/// The snapped area decides, not the normal, because the snapped polygon is drawn, and snapping may turn over
 /// a face that is seen edge-on. A face that clipping removed has no area.
 fn looks_at_viewer(polygon: &[Vertex]) -> bool {
     let mut area = 0i64;

@@ -23,14 +23,14 @@ impl PoseChange {
         Self { from, to }
     }
 
-    /// Moves a point of view space, to within some 2^-16 unit.
+    /// Moves a point of view space. The result is off by about 2^-16 unit.
     fn point(&self, [x, y, z]: Vec3) -> Vec3 {
         let (from, to) = (&self.from, &self.to);
         let [x, y, z] = to.0.turn(from.0.turn_back([x, y, z - from.1]));
         [x, y, z + to.1]
     }
 
-    /// The anchors in the new pose.
+    /// Returns the anchors in the new pose.
     pub fn anchors(&self, anchors: &[Anchor; 3]) -> [Anchor; 3] {
         anchors.map(|anchor| Anchor {
             position: self.point(anchor.position),
@@ -38,8 +38,8 @@ impl PoseChange {
         })
     }
 
-    /// Whether the motion hides a mapper's errors in a face's texture: one of the face's points moves by half
-    /// a pixel or more, and the face does not move in its own plane.
+    /// Returns whether the motion hides a mapper's errors in a face's texture: one of the face's points moves
+    /// by half a pixel or more, and the face does not move in its own plane.
     pub fn hides_errors(&self, anchors: &[Anchor; 3]) -> bool {
         let places = anchors.map(|anchor| anchor.position.map(i64::from));
         let ways = anchors.map(|anchor| {
@@ -82,7 +82,7 @@ pub(crate) struct MapperChoice {
 }
 
 impl MapperChoice {
-    /// The mappers of a frame of `pose`.
+    /// Returns the choice of mappers for a frame of `pose`.
     pub fn new(options: &RenderOptions, pose: &Pose) -> Self {
         let next = options.next.filter(|next| next != pose);
         let reduced = options.mapper.lower().zip(next);
@@ -92,7 +92,7 @@ impl MapperChoice {
         }
     }
 
-    /// The mapper for a face.
+    /// Returns the mapper for a face.
     pub fn mapper(&self, face: &Face<'_>) -> Mapper {
         match &self.reduced {
             Some((reduced, change)) if change.hides_errors(&face.anchors) => *reduced,

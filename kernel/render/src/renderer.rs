@@ -19,7 +19,7 @@ pub struct RenderMemory {
 }
 
 impl RenderMemory {
-    /// Empty arenas, about 3 MiB: intended for a static.
+    /// Returns empty arenas, about 2.6 MiB. They are meant for a static.
     pub const fn new() -> Self {
         Self {
             surfaces: [0; SURFACE_BYTES],
@@ -50,7 +50,7 @@ pub struct SceneRenderer<'a> {
 }
 
 impl<'a> SceneRenderer<'a> {
-    /// Lights the textures of `scene` into `memory`.
+    /// Returns a renderer of `scene`, whose textures it lights into `memory`.
     ///
     /// # Panics
     /// As [`SceneRenderer::set`].
@@ -81,8 +81,8 @@ impl<'a> SceneRenderer<'a> {
     /// If the scene is larger than the arenas: more than [`MAX_VERTICES`] vertices; for a mesh that is not
     /// convex, more than [`MAX_FACES`] faces; more than 16 textures, each mipmap counted; or textures of more
     /// than [`SURFACE_BYTES`] / [`LIGHT_LEVELS`](scene::LIGHT_LEVELS) texels together, each padded to powers
-    /// of two. If a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or a vertex is further out
-    /// than [`MAX_EXTENT`].
+    /// of two. Also if a face has fewer than 3 or more than [`MAX_CORNERS`] corners, or if a vertex is
+    /// further out than [`MAX_EXTENT`].
     pub fn set(&mut self, scene: Scene<'a, '_>) {
         let (vertices, faces) = (scene.mesh.vertices.len(), scene.mesh.faces.len());
         assert!(
@@ -119,32 +119,32 @@ impl<'a> SceneRenderer<'a> {
         self.background = scene.background;
     }
 
-    /// The scene's name.
+    /// Returns the scene's name.
     pub fn name(&self) -> &'static str {
         self.name
     }
 
-    /// Whether no face hides a part of another.
+    /// Returns whether no face hides a part of another.
     pub fn is_convex(&self) -> bool {
         self.mesh.convex
     }
 
-    /// The DAC's colours.
+    /// Returns the DAC's colours.
     pub fn palette(&self) -> &'a Palette {
         self.palette
     }
 
-    /// The colour of each scan line where no solid covers it.
+    /// Returns the colour of each scan line where no solid covers it.
     pub fn background(&self) -> &'a [u8; HEIGHT] {
         self.background
     }
 
-    /// The lit texture with the number in a polygon's [`Face`](texmap::Face).
+    /// Returns the lit texture with the number in a polygon's [`Face`](texmap::Face).
     pub fn surface(&self, number: u16) -> Texture<'_> {
         self.surfaces.texture(number)
     }
 
-    /// Turns the scene into a pose.
+    /// Returns the scene in `pose`.
     ///
     /// At a distance outside 0 to [`Pose::MAX_DISTANCE`] every face is dropped. At other distances a face is
     /// dropped only if clipping leaves it too many corners.

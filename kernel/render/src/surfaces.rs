@@ -17,7 +17,7 @@ const MAX_SURFACES: usize = 16;
 /// Mipmaps of a texture: the texture itself, and copies down to 1/64 of its sides.
 const MIPMAPS: usize = 7;
 
-/// The place of a texture's lit copies: one copy for each light level, one after the other.
+/// The place of a texture's lit copies, which follow each other: one for each light level.
 #[derive(Clone, Copy, Debug, Default)]
 struct Surface {
     first: usize,
@@ -28,7 +28,7 @@ struct Surface {
 }
 
 impl Surface {
-    /// The copy for a light level.
+    /// Returns the copy for a light level.
     fn lit<'t>(&self, level: usize, texels: &'t [u8; SURFACE_BYTES]) -> Texture<'t> {
         let (width, height) = (self.width, self.height);
         let len = self.texels();
@@ -40,18 +40,18 @@ impl Surface {
         texture.expect("a lit copy has the sides of its texture")
     }
 
-    /// Texels of one copy, padding included.
+    /// Returns the number of texels of one copy, padding included.
     fn texels(&self) -> usize {
         let (width, height) = self.sides();
         Texture::padded_len(width, height)
     }
 
-    /// Texels that are stored across and down: the tile's, or the texture's.
+    /// Returns the numbers of texels stored across and down: the tile's, or the texture's.
     fn sides(&self) -> (u16, u16) {
         self.tile.unwrap_or((self.width, self.height))
     }
 
-    /// The texture with each side halved `times` times; a side is at least one texel.
+    /// Returns the texture with each side halved `times` times; a side is at least one texel.
     fn halved(self, times: usize) -> Self {
         let part = |side: u16| (side >> times).max(1);
         Self {
@@ -85,7 +85,7 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Replaces the surfaces by those of `scene`.
+    /// Replaces the surfaces with those of `scene`.
     ///
     /// # Panics
     /// If the scene has more than [`MAX_SURFACES`] surfaces, or the copies need more than [`SURFACE_BYTES`].
@@ -141,7 +141,7 @@ impl<'a> Surfaces<'a> {
             .min();
     }
 
-    /// The mipmap that a polygon uses.
+    /// Returns the mipmap that a polygon uses.
     pub fn mipmap(&self, polygon: &[Vertex]) -> usize {
         match self.mipmaps {
             1 => 0,
@@ -149,21 +149,21 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// The number of a texture's lit copy.
+    /// Returns the number of a texture's lit copy.
     pub fn number(&self, texture: u16, mip: usize, level: usize) -> u16 {
         ((usize::from(texture) * self.mipmaps + mip) * LIGHT_LEVELS + level) as u16
     }
 
-    /// The lit copy with a number.
+    /// Returns the lit copy with a number.
     pub fn texture(&self, number: u16) -> Texture<'_> {
         let number = usize::from(number);
         self.all[number / LIGHT_LEVELS].lit(number % LIGHT_LEVELS, self.texels)
     }
 
-    /// Every lit copy, by number.
+    /// Returns every lit copy, by number.
     ///
-    /// Made for each frame, in 1 to 5 us: the copies borrow the cache, so the renderer cannot keep both. A
-    /// look-up for each job would cost more, at 13 ns and thousands of jobs.
+    /// The renderer calls this for each frame, at 1 to 5 us: the copies borrow the cache, so it cannot keep
+    /// both. A look-up for each job would cost more, at 13 ns and thousands of jobs.
     pub fn textures(&self) -> [Texture<'_>; MAX_SURFACES * LIGHT_LEVELS] {
         let mut textures = [Texture::DOT; MAX_SURFACES * LIGHT_LEVELS];
         let lit = textures.chunks_exact_mut(LIGHT_LEVELS);
@@ -180,14 +180,15 @@ impl<'a> Surfaces<'a> {
         textures
     }
 
-    /// Half the shortest period of the textures, 16.16 texels. Returns `None` if no texture has two colours.
+    /// Returns half the shortest period of the textures, 16.16 texels, or `None` if no texture has two
+    /// colours.
     pub fn half_period(&self) -> Option<u32> {
         self.half_period
     }
 }
 
-/// The colour nearest to the mean of a block of `size` texels. `place` is the block's column and row, counted
-/// in blocks. The result is a material's colour, which light can change.
+/// Returns the colour nearest to the mean of a block of `size` texels. `place` is the block's column and row,
+/// counted in blocks. The result is a material's colour, which light can change.
 fn mean(texture: &Texture<'_>, place: (u16, u16), size: (u16, u16), palette: &Palette) -> u8 {
     let mut sum = [0; 3];
     for j in 0..size.1 {
@@ -210,10 +211,11 @@ fn mean(texture: &Texture<'_>, place: (u16, u16), size: (u16, u16), palette: &Pa
     MATERIALS.min_by_key(distance).unwrap_or(0) as u8
 }
 
-/// The mipmap, of `mipmaps`, that a polygon uses. Along the side with the most texels to a pixel, a pixel
-/// covers one texel of that mipmap, within a factor of the square root of two.
+/// Returns the mipmap, of `mipmaps`, that a polygon uses. Along the side with the most texels to a pixel, a
+/// pixel covers one texel of that mipmap, within a factor of the square root of two.
 ///
-/// The direction of that side would show a moire pattern; across it the mipmap is smoother than necessary.
+/// A larger mipmap would show a moire pattern along that side; across it, this mipmap is smoother than
+/// necessary.
 fn mipmap(polygon: &[Vertex], mipmaps: usize) -> usize {
     let mut mip = 0;
     for (i, a) in polygon.iter().enumerate() {

@@ -9,7 +9,7 @@ use scene::{MAX_CORNERS, MAX_EXTENT, Pose, Vec3};
 #[test]
 fn at_every_distance_nothing_is_dropped() {
     let mut random = seeded::generator();
-    let mut storage = in_place::boxed!(RenderMemory);
+    let mut memory = in_place::boxed!(RenderMemory);
     let unit = 1 << 16;
     for solid in [
         Solid::ball(),
@@ -26,9 +26,11 @@ fn at_every_distance_nothing_is_dropped() {
                     _ => random.i32(0..2 * unit),
                 };
                 let pose = pose(&mut random, distance);
-                solid.with_renderer(&mut storage, |stage| {
+                solid.with_renderer(&mut memory, |renderer| {
                     let mut page = PlanarBuffer::new();
-                    let stats = stage.draw(&pose, RenderOptions::default(), &mut page).stats;
+                    let stats = renderer
+                        .draw(&pose, RenderOptions::default(), &mut page)
+                        .stats;
                     assert_eq!(stats.dropped, 0, "{pose:?}");
                 });
             }
@@ -72,7 +74,7 @@ fn closed_solids_have_no_gap_from_outside_and_no_double_but_in_a_fold() {
     for mix in [SolidMix::Ball, SolidMix::Cube, SolidMix::Octahedron] {
         let compared = sweep(mix, 300);
         assert!(!seeded::is_whole() || compared.pixels > 200_000);
-        // One in some ten thousand poses has a fold with a pixel.
+        // About one in ten thousand poses has a fold that covers a pixel.
         assert!(compared.folds <= 3);
     }
 }
@@ -92,7 +94,7 @@ fn cut_faces_are_where_lines_of_sight_meet_them() {
 
 #[test]
 fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
-    let mut storage = in_place::boxed!(RenderMemory);
+    let mut memory = in_place::boxed!(RenderMemory);
     let unit = 1 << 16;
     let cube = Solid::cuboid([unit; 3]);
     let mut count = PixelCounter::default();
@@ -103,7 +105,7 @@ fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
             roll,
             distance: unit + above,
         };
-        let stats = count.draw(&mut storage, &cube, &pose);
+        let stats = count.draw(&mut memory, &cube, &pose);
         assert_eq!(stats.dropped, 0);
         (stats.polygons, count.gaps_and_doubles())
     };
@@ -111,14 +113,14 @@ fn the_eye_may_come_to_a_256th_of_a_unit_from_a_face() {
         for above in [128, 129, 256, 257, 512, unit / 256 * 3] {
             assert_eq!(looking_on(above, roll), (1, (0, 0)), "{above} above");
         }
-        // Nearer than the near plane, the whole face is cut away.
+        // A face nearer than the near plane is cut away whole.
         assert_eq!(looking_on(127, roll), (0, (WIDTH * HEIGHT, 0)));
     }
 }
 
 #[test]
 fn beyond_the_limits_all_is_dropped_and_counted() {
-    let mut storage = in_place::boxed!(RenderMemory);
+    let mut memory = in_place::boxed!(RenderMemory);
     let cube = Solid::cuboid([1 << 16; 3]);
     let mut count = PixelCounter::default();
     for (distance, dropped) in [
@@ -135,7 +137,7 @@ fn beyond_the_limits_all_is_dropped_and_counted() {
             distance,
             ..Pose::at_tick(0)
         };
-        let stats = count.draw(&mut storage, &cube, &pose);
+        let stats = count.draw(&mut memory, &cube, &pose);
         assert_eq!(stats.dropped, dropped, "distance {distance}");
         let (gaps, doubles) = count.gaps_and_doubles();
         // At the largest distance the cube is some four pixels wide; from inside it shows no face.
@@ -147,7 +149,7 @@ fn beyond_the_limits_all_is_dropped_and_counted() {
 /// Such a face is not legal, but it must do no harm.
 #[test]
 fn a_zigzag_that_clipping_gives_too_many_corners_is_dropped_and_counted() {
-    let mut storage = in_place::boxed!(RenderMemory);
+    let mut memory = in_place::boxed!(RenderMemory);
     for (corners, dropped) in [(3, 0), (5, 0), (MAX_CORNERS, 1)] {
         let vertices: Vec<Vec3> = (0..corners as i32)
             .map(|i| {
@@ -166,7 +168,7 @@ fn a_zigzag_that_clipping_gives_too_many_corners_is_dropped_and_counted() {
             roll: 0,
             distance: 0,
         };
-        let stats = PixelCounter::default().draw(&mut storage, &solid, &straight);
+        let stats = PixelCounter::default().draw(&mut memory, &solid, &straight);
         assert_eq!(stats.dropped, dropped, "{corners} corners");
     }
 }
@@ -181,8 +183,8 @@ fn meshes_that_clipping_has_no_room_for_are_refused() {
     let accepted = |solid: &Solid| {
         let solid = solid.clone();
         std::panic::catch_unwind(move || {
-            let mut storage = in_place::boxed!(RenderMemory);
-            solid.with_renderer(&mut storage, |_| ());
+            let mut memory = in_place::boxed!(RenderMemory);
+            solid.with_renderer(&mut memory, |_| ());
         })
         .is_ok()
     };

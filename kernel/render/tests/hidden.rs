@@ -11,7 +11,7 @@ use texmap::{Mapper, Order};
 fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
     let poses = seeded::cases(poses);
     let mut random = seeded::generator();
-    let mut storage = in_place::boxed!(RenderMemory);
+    let mut memory = in_place::boxed!(RenderMemory);
     let mut models = models(&mut random);
     random.shuffle(&mut models);
     let solids = seeded::cases(models.len());
@@ -25,7 +25,7 @@ fn hidden(poses: usize, mappers: &[(Mapper, Order)]) {
                 order,
                 next: None,
             };
-            let compared = check(&mut storage, &solid, &pose, options)
+            let compared = check(&mut memory, &solid, &pose, options)
                 .unwrap_or_else(|wrong| panic!("{name} by {mapper}, {order}, {pose:?}: {wrong}"));
             pixels += compared.pixels;
             contested += compared.contested;
@@ -64,7 +64,7 @@ fn it_is_so_by_every_mapper_in_every_order() {
     }
 }
 
-/// A few minutes.
+/// All solids and mappers; runs for a few minutes.
 #[test]
 #[ignore = "deep"]
 fn it_is_so_in_many_poses() {

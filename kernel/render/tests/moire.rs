@@ -14,33 +14,33 @@ use scene::catalogue::{Entry, MAX_TEXELS};
 use texmap::plane::Form;
 use texmap::{Mapper, Plane};
 
-/// Samples across a pixel, and down.
+/// Samples across a pixel, and as many down.
 const PLACES: i64 = 8;
 
-/// Calls `look` with a scene's stage.
-fn on_stage<T>(name: &str, look: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>) -> T) -> T {
+/// Calls `work` with a scene's entry and its renderer, and returns its result.
+fn with_renderer<T>(name: &str, work: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>) -> T) -> T {
     let entry = Entry::parse(name).unwrap();
     let mut texels = Box::new([0; MAX_TEXELS]);
     let textures = entry.paint(&mut texels);
-    let mut storage = in_place::boxed!(RenderMemory);
-    look(
+    let mut memory = in_place::boxed!(RenderMemory);
+    work(
         entry,
-        &mut SceneRenderer::new(&mut storage, entry.scene(&textures)),
+        &mut SceneRenderer::new(&mut memory, entry.scene(&textures)),
     )
 }
 
-/// For each pixel that covers more than two texels, the mean of its samples: red, green and blue, 0 to 63. In
-/// other pixels hardly a texel is left out.
-fn means(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
-    let seen = nearest(stage, pose);
+/// Returns the mean of the samples of each pixel that covers more than two texels: red, green and blue, 0 to
+/// 63. At other pixels the exact mapper leaves out hardly any texel.
+fn means(renderer: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
+    let seen = nearest(renderer, pose);
     let mut faces = Vec::new();
-    stage.at(pose).faces(|number, face| {
+    renderer.at(pose).faces(|number, face| {
         let face = face.unwrap();
         faces.push((number, face.plane(), face.texture));
     });
-    let (palette, mut means) = (*stage.palette(), vec![None; WIDTH * HEIGHT]);
+    let (palette, mut means) = (*renderer.palette(), vec![None; WIDTH * HEIGHT]);
     for (number, Plane { a, b, c }, surface) in faces {
-        let texture = stage.surface(surface);
+        let texture = renderer.surface(surface);
         let (last_u, last_v) = texture.last();
         for (i, mean) in means.iter_mut().enumerate() {
             if seen[i].first() != Some(&number) {
@@ -48,8 +48,8 @@ fn means(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
             }
             let (x, y) = ((i % WIDTH) as u16, (i / WIDTH) as u16);
             let at = |form: &Form, i: i64, j: i64| {
-                let aside = form.right * (2 * i + 1 - PLACES) + form.down * (2 * j + 1 - PLACES);
-                (form.at(x, y) + aside / (2 * PLACES)) as f64
+                let offset = form.right * (2 * i + 1 - PLACES) + form.down * (2 * j + 1 - PLACES);
+                (form.at(x, y) + offset / (2 * PLACES)) as f64
             };
             let wide = |form: &Form| {
                 let at = |i, j| at(form, i, j) / at(&c, i, j);
@@ -77,9 +77,9 @@ fn means(stage: &mut SceneRenderer<'_>, pose: &Pose) -> Vec<Option<[f64; 3]>> {
     means
 }
 
-/// The colour error of each covered pixel.
+/// Returns the colour error of each covered pixel.
 fn errors(
-    stage: &mut SceneRenderer<'_>,
+    renderer: &mut SceneRenderer<'_>,
     pose: &Pose,
     means: &[Option<[f64; 3]>],
 ) -> Vec<Option<[f64; 3]>> {
@@ -88,26 +88,26 @@ fn errors(
         mapper: Mapper::Exact,
         ..RenderOptions::default()
     };
-    stage.draw(pose, options, &mut page);
+    renderer.draw(pose, options, &mut page);
     let error = |(i, mean): (usize, &Option<[f64; 3]>)| {
-        let colour = stage.palette()[usize::from(page.pixel(i % WIDTH, i / WIDTH))];
+        let colour = renderer.palette()[usize::from(page.pixel(i % WIDTH, i / WIDTH))];
         mean.map(|mean| [0, 1, 2].map(|k| f64::from(colour[k]) - mean[k]))
     };
     means.iter().enumerate().map(error).collect()
 }
 
 #[test]
-fn mipmaps_take_half_of_the_shimmer_away() {
+fn mipmaps_remove_a_third_of_the_shimmer() {
     let pairs = [0, 130, 300, 555].map(|tick| [tick, tick + 1]);
     let pose = |tick: u32| Entry::parse("corridor").unwrap().pose(tick);
-    let truth = on_stage("moire", |_, stage| {
-        pairs.map(|pair| pair.map(|tick| means(stage, &pose(tick))))
+    let truth = with_renderer("moire", |_, renderer| {
+        pairs.map(|pair| pair.map(|tick| means(renderer, &pose(tick))))
     });
     let energies = |name| {
-        on_stage(name, |_, stage| {
+        with_renderer(name, |_, renderer| {
             let mut energies = Vec::new();
             for (pair, means) in pairs.iter().zip(&truth) {
-                let [a, b] = [0, 1].map(|i| errors(stage, &pose(pair[i]), &means[i]));
+                let [a, b] = [0, 1].map(|i| errors(renderer, &pose(pair[i]), &means[i]));
                 let both = a.iter().zip(&b).filter_map(|(a, b)| Some(((*a)?, (*b)?)));
                 let squares: Vec<f64> = both
                     .map(|(a, b)| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>() / 3.0)

@@ -22,8 +22,8 @@ const SCALE: i64 = FOCAL_LENGTH as i64 * SUBPIXELS as i64;
 /// The centre of the screen in subpixels.
 const MIDDLE: (i32, i32) = (WIDTH as i32 / 2 * SUBPIXELS, HEIGHT as i32 / 2 * SUBPIXELS);
 
-/// The screen position of a point in 16.16, rounded to 1/256 pixel (half up). The point is inside the near
-/// plane and the guard band.
+/// Returns the screen position of a point in 16.16, rounded to 1/256 pixel (half up). The point is inside the
+/// near plane and the guard band.
 pub(crate) fn project(point: Vec3) -> (i32, i32) {
     let [x, y, z] = point.map(i64::from);
     let round = |n: i64| (2 * n + z).div_euclid(2 * z) as i32;

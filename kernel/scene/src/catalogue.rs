@@ -49,7 +49,7 @@ mod tests {
     /// Ticks from a whole turn, at irregular intervals.
     const TICKS: [u32; 9] = [0, 1, 89, 180, 271, 360, 447, 540, 719];
 
-    /// The distance of each vertex of a mesh at a tick.
+    /// Returns the distance of each vertex of a mesh at a tick.
     fn depths(entry: &Entry<'_>, tick: u32) -> Vec<i32> {
         let pose = entry.pose(tick);
         let orientation = pose.orientation();
@@ -70,7 +70,8 @@ mod tests {
         assert!(!known.contains(Entry::LOADED));
     }
 
-    /// For each texture that a scene before painted: the scene that paints it again, and the first one.
+    /// The scenes that paint a texture which an earlier scene has painted, each with the first of those
+    /// scenes; once per texture.
     const SHARED: [(&str, &str); 3] = [
         ("grazing-16", "tilted"),
         ("moire", "corridor"),

@@ -13,7 +13,7 @@
 //! are left out or written twice.
 //!
 //! - A crossing is computed from the edge's two end points, unmodified, *from the end inside to the end
-//!   outside*, whichever way the face walks the edge; and it is the exact point, rounded once.
+//!   outside*, in whichever direction the face follows the edge. It is the exact point, rounded once.
 //! - Each plane replaces the remaining piece of an edge by the part inside that plane. That depends on the
 //!   edge's two end points only. By induction both faces keep the same piece after each plane, also where
 //!   several planes cut one edge.
@@ -96,7 +96,7 @@ impl ViewPoint {
         outside: 0,
     };
 
-    /// A vertex in view space: |x| and |y| are below 2^23 (128 units), |z| below 2^24.
+    /// Returns a vertex at `view`: |x| and |y| are below 2^23 (128 units), |z| below 2^24.
     pub fn new(view: Vec3) -> Self {
         let mut outside = 0;
         let wide = view.map(i64::from);
@@ -115,7 +115,7 @@ impl ViewPoint {
 }
 
 impl ViewPoint {
-    /// In view space, 16.16.
+    /// Returns the position in view space, 16.16.
     pub fn view(&self) -> Vec3 {
         self.view
     }
@@ -173,7 +173,7 @@ impl Outline {
 }
 
 impl ClipPlane {
-    /// The distance of `corner` inside the plane, in the units of the plane's form.
+    /// Returns the distance of `corner` inside the plane, in the units of the plane's form.
     fn height(&self, corner: &ClipCorner) -> i128 {
         let product: i128 = (0..3)
             .map(|k| i128::from(self.form[k]) * i128::from(corner.at[k]))
@@ -182,9 +182,9 @@ impl ClipPlane {
     }
 }
 
-/// The point where the edge from the end inside to the end outside meets the plane. `above` (more than 0) and
-/// `below` (less than 0) are the heights of the two ends. The point and its texture coordinates lie between
-/// the two ends, so nothing needs clamping.
+/// Returns the point where the edge from the end inside to the end outside meets the plane. `above` (more
+/// than 0) and `below` (less than 0) are the heights of the two ends. The point and its texture coordinates
+/// lie between the two ends, so nothing needs clamping.
 fn crossing(inside: &ClipCorner, outside: &ClipCorner, above: i128, below: i128) -> ClipCorner {
     let whole = above - below;
     let between = |from: i64, to: i64| {
@@ -229,7 +229,8 @@ pub fn place(
     clip(corners, points, polygon)
 }
 
-/// Cold path: clipping is rare, so it stays out of the common path.
+/// Clips and projects a face as [`place`] does. Cold path: clipping is rare, so it stays out of the common
+/// path.
 #[cold]
 fn clip(
     corners: &[Corner],
@@ -295,9 +296,9 @@ mod tests {
         let texture = Texture::new(&texels, 256, 256).unwrap();
         let mut pixels = vec![false; WIDTH * HEIGHT];
         let legal = Sides::new(polygon, &texture, texmap::Axis::Down).and_then(|_| {
-            scan::columns(polygon, |run| {
-                for y in run.first..run.first + run.len {
-                    pixels[usize::from(y) * WIDTH + usize::from(run.line)] ^= true;
+            scan::columns(polygon, |span| {
+                for y in span.first..span.first + span.len {
+                    pixels[usize::from(y) * WIDTH + usize::from(span.line)] ^= true;
                 }
             })
         });
@@ -305,13 +306,13 @@ mod tests {
         pixels
     }
 
-    /// A random coordinate; every magnitude from 1 to the largest is equally likely.
+    /// Returns a random coordinate; every magnitude from 1 to the largest is equally likely.
     fn coordinate(random: &mut fastrand::Rng, bits: u32) -> i32 {
         let size = 1 << random.u32(0..=bits);
         random.i32(-size + 1..size)
     }
 
-    /// A random point before, behind or beside the eye, often exactly on a plane.
+    /// Returns a random point before, behind or beside the eye, often exactly on a clip plane.
     fn view(random: &mut fastrand::Rng) -> Vec3 {
         let mut view = [23, 23, 24].map(|bits| coordinate(random, bits));
         match random.u8(0..8) {
@@ -402,8 +403,8 @@ mod tests {
         assert_eq!(middle.at, [0, 0, 1 << 50]);
     }
 
-    /// Clips the edge alone, as a face of two corners. Every face with that edge, walked in either direction,
-    /// must contain the remaining piece bit for bit, texture coordinates included.
+    /// Clips the edge alone, as a face of two corners. Every face with that edge, followed in either
+    /// direction, must contain the remaining piece bit for bit, texture coordinates included.
     #[test]
     fn every_face_of_an_edge_is_left_with_the_same_piece_of_it() {
         let mut random = seeded::generator();
@@ -528,9 +529,9 @@ mod tests {
     fn behind_the_eye_and_edge_on_nothing_is_seen() {
         let behind = [[-500, -400, -1], [900, 100, -70_000], [0, 800, 0]];
         assert_eq!(placed(&behind), []);
-        // Far to one side: removed, without a vertex.
-        let aside = [[1 << 23, 0, 9], [1 << 23, 99, 300], [1 << 22, -999, 500]];
-        assert_eq!(placed(&aside), []);
+        // Far to the right: removed, without a vertex.
+        let to_the_right = [[1 << 23, 0, 9], [1 << 23, 99, 300], [1 << 22, -999, 500]];
+        assert_eq!(placed(&to_the_right), []);
         // In a plane with the eye, from in front of it to behind it.
         for face in [
             [[-3000, 0, 5000], [3000, 0, 5000], [0, 0, -5000]],

@@ -76,7 +76,8 @@ pub enum Ramp {
 }
 
 impl Ramp {
-    /// The colour at a shade below [`SHADES`]. Textures should leave the upper quarter to the highlight.
+    /// Returns the colour at a shade below [`SHADES`]. Textures should leave the upper quarter to the
+    /// highlight.
     pub const fn shade(self, shade: usize) -> u8 {
         (FIRST_SHADE + self as usize * SHADES + shade) as u8
     }
@@ -176,7 +177,7 @@ pub const FULL_LIGHT: usize = 17;
 /// Ambient light, in levels: keeps the dark side from black.
 pub const AMBIENT: usize = 4;
 /// Half shades that each level of highlight adds: enough to bring enamel half-way to white, and metal nearly
-/// to it.
+/// to white.
 const SHINE: [usize; RAMPS] = [3, 3, 3, 3, 3, 4, 3];
 
 const fn light_table() -> LightTable {
@@ -245,10 +246,10 @@ const HALFWAY: [i64; 3] = [-3674, -3254, -15_632];
 /// Towards the dusk behind the ball, opposite the lamp: lights the rim of the dark side.
 const DUSK: [i64; 3] = [9800, 9800, 8700];
 
-/// The light level of a face whose outward normal in view space is `normal`, 14 fraction bits.
+/// Returns the light level of a face whose outward normal in view space is `normal`, 14 fraction bits.
 pub fn lit_level(normal: Vec3) -> usize {
     let normal = normal.map(i64::from);
-    // The cosine of two unit vectors: at most 2^14, but for rounding.
+    // The cosine of the angle between two unit vectors: at most 2^14, except for rounding.
     let cosine = |v: [i64; 3]| (0..3).map(|k| normal[k] * v[k]).sum::<i64>() >> 14;
     // The lamp is large: its light reaches a quarter of the radius beyond the terminator.
     let lamp = (cosine(LAMP) + 4096).max(0) * 4 / 5;
@@ -264,7 +265,7 @@ pub fn lit_level(normal: Vec3) -> usize {
 mod tests {
     use super::*;
 
-    /// Ten times the brightness of a colour, by the usual weights of red, green and blue.
+    /// Returns ten times the brightness of a colour, by the usual weights of red, green and blue.
     fn brightness(colour: usize) -> u32 {
         let [r, g, b] = PALETTE[colour].map(u32::from);
         3 * r + 6 * g + b

@@ -120,7 +120,7 @@ impl<'a> Entry<'a> {
     /// The name of a loaded model; no built-in scene has it.
     pub const LOADED: &'static str = "model";
 
-    /// An entry for a loaded model. It turns as the ball does.
+    /// Returns an entry for a loaded model, which turns as the ball does.
     pub fn loaded(
         mesh: Mesh<'a>,
         texture: Texture<'a>,
@@ -140,7 +140,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// Returns the textures in full light; `texels` holds the painted ones.
+    /// Returns the textures in full light; `texels` holds the texels of painted textures.
     pub fn paint<'m>(&self, texels: &'m mut [u8; MAX_TEXELS]) -> Textures<'m>
     where
         'a: 'm,
@@ -167,14 +167,14 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// The default pose at a tick: frame N of the scene is its pose at tick N.
+    /// Returns the default pose at a tick: frame N of the scene is its pose at tick N.
     pub fn pose(&self, tick: u32) -> Pose {
         (self.pose)(tick)
     }
 
     /// Returns a pose that looks as `next` does, at the distance nearest to that of `pose`.
     ///
-    /// A walk along tiles jumps from the end of a tile back to its start. The two frames do not show the
+    /// A motion along tiles jumps from the end of a tile back to its start. The two frames do not show the
     /// jump, but the distance from one pose to the next would.
     pub fn following(&self, pose: &Pose, next: Pose) -> Pose {
         if self.tile == 0 {

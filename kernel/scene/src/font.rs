@@ -86,7 +86,7 @@ pub fn glyph(character: char) -> Glyph {
     FONT.get(character as usize).copied().unwrap_or_default()
 }
 
-/// Whether a character's glyph covers a pixel; (0, 0) is the glyph's top left.
+/// Returns whether a character's glyph covers a pixel; (0, 0) is the glyph's top left.
 pub(crate) fn covers(character: char, x: i64, y: i64) -> bool {
     let column = 0..WIDTH as i64;
     let row = usize::try_from(y).ok().filter(|&y| y < HEIGHT);
@@ -100,8 +100,8 @@ mod tests {
     #[test]
     fn no_two_glyphs_are_alike() {
         for (i, (a, rows)) in GLYPHS.iter().enumerate() {
-            let twin = GLYPHS[..i].iter().find(|(_, other)| other == rows);
-            assert_eq!(twin, None, "{}", *a as char);
+            let same = GLYPHS[..i].iter().find(|(_, other)| other == rows);
+            assert_eq!(same, None, "{}", *a as char);
             let a = *a as char;
             assert_eq!(glyph(a), glyph(a.to_ascii_lowercase()));
             assert_ne!(glyph(a), [0; HEIGHT]);

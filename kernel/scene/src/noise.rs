@@ -3,7 +3,7 @@
 /// One, with the 16 fraction bits of every number here.
 pub const ONE: i64 = 1 << 16;
 
-/// Value noise at a point whose cells have 16 fraction bits: 0 to 65 535, smooth across cells.
+/// Returns value noise at a point whose cells have 16 fraction bits: 0 to 65 535, smooth across cells.
 pub fn noise(point: [i64; 3], seed: u32) -> i64 {
     let [x, y, z] = point.map(|c| c >> 16);
     // 3t^2 - 2t^3, so that slopes meet at the cells' corners; 0 to 65 535.
@@ -16,8 +16,8 @@ pub fn noise(point: [i64; 3], seed: u32) -> i64 {
     mix(along_y(z), along_y(z + 1), sz)
 }
 
-/// `octaves` octaves of [`noise`], each half as strong and twice as fine. The sum crowds about the middle and
-/// is stretched: 0 to 65 535.
+/// Returns the sum of `octaves` octaves of [`noise`], each half as strong and twice as fine. Sums crowd
+/// around the middle, so the result is stretched: 0 to 65 535.
 pub fn fractal(point: [i64; 3], octaves: u32, seed: u32) -> i64 {
     let sum: i64 = (0..octaves)
         .map(|octave| noise(point.map(|c| c << octave), seed + octave) >> (octave + 1))
@@ -30,7 +30,7 @@ const fn mix(a: i64, b: i64, t: i64) -> i64 {
     a + (((b - a) * t) >> 16)
 }
 
-/// A hash of a cell: 0 to 65 535.
+/// Returns a hash of a cell: 0 to 65 535.
 pub fn hash(cell: [i64; 3], seed: u32) -> i64 {
     let mut h = seed.wrapping_mul(0x9E37_79B9);
     for c in cell {

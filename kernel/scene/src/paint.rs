@@ -56,8 +56,8 @@ const SIGNS: [[&[u8; 71]; 12]; 2] = [
 /// The shade of the dark edge beside metal.
 const EDGE: u8 = Ramp::Indigo.shade(2);
 
-/// The colour of the texel at a longitude, a polar angle up to half a turn, and the corresponding point on
-/// the unit sphere (30 fraction bits).
+/// Returns the colour of the texel at a longitude, a polar angle up to half a turn, and the corresponding
+/// point on the unit sphere (30 fraction bits).
 pub fn texel(longitude: u32, polar: u32, point: [i64; 3]) -> u8 {
     let column = ((u64::from(longitude) * COLUMNS) >> 32) as i64;
     let row = ((u64::from(polar) * 2 * ROWS) >> 32) as i64;
@@ -68,7 +68,7 @@ pub fn texel(longitude: u32, polar: u32, point: [i64; 3]) -> u8 {
         .unwrap_or_else(|| nebula(point))
 }
 
-/// The belt of the zodiac around the equator.
+/// Returns the colour of the belt of the zodiac around the equator, or `None` beside it.
 fn belt(column: i64, row: i64) -> Option<u8> {
     let (sign, x) = (column / SIGN, column % SIGN);
     // Half degrees from the equator, downwards: an odd number, since the equator separates two rows.
@@ -92,7 +92,7 @@ fn belt(column: i64, row: i64) -> Option<u8> {
     })
 }
 
-/// Whether a sign's drawing covers column `x` of the sign's field and row `row` of the globe.
+/// Returns whether a sign's drawing covers column `x` of the sign's field and row `row` of the globe.
 fn in_sign(sign: i64, x: i64, row: i64) -> bool {
     let (x, y) = (x - 5, row - (ROWS as i64 / 2 - 6));
     (0..11).contains(&x)
@@ -100,13 +100,13 @@ fn in_sign(sign: i64, x: i64, row: i64) -> bool {
         && SIGNS[sign as usize / 6][y as usize][(sign % 6 * 12 + x) as usize] == b'#'
 }
 
-/// The compass roses on the poles.
+/// Returns the colour of the compass roses on the poles, or `None` beside them.
 fn rose(longitude: u32, polar: u32) -> Option<u8> {
     let polar = i64::from(polar);
     // Quarter degrees from the nearer pole.
     let radius = polar.min((1 << 31) - polar) * 4 / DEGREE;
-    // Six long points, and six short ones between them. Each value is the angle from the point's axis, scaled
-    // so that a whole turn leads from one axis to the next.
+    // Six long points, and six short points between them. Each value is the angle from the point's axis,
+    // scaled so that a whole turn leads from one axis to the next.
     let long = longitude.wrapping_mul(6);
     let short = long.wrapping_add(1 << 31);
     let in_point = |angle: u32, tip: i64, valley: i64| {
@@ -128,7 +128,7 @@ fn rose(longitude: u32, polar: u32) -> Option<u8> {
     })
 }
 
-/// Six gold meridians, and the path of the moon in silver.
+/// Returns the colour of the six gold meridians and of the path of the moon in silver, or `None` beside them.
 fn wire(longitude: u32, polar: u32, point: [i64; 3]) -> Option<u8> {
     // Through the centre of the lozenges, which is the middle of a column.
     let from_first = i64::from(longitude) - 3 * DEGREE / 4;
@@ -151,8 +151,8 @@ fn wire(longitude: u32, polar: u32, point: [i64; 3]) -> Option<u8> {
     }
 }
 
-/// The stars: one at a random place in each cell of 10 columns and 12 rows, so that they neither cluster nor
-/// line up. A quarter of them are large.
+/// Returns the colour of a star, or `None` beside the stars. One star lies at a random place in each cell of
+/// 10 columns and 12 rows, so that they neither cluster nor line up. A quarter of them are large.
 fn star(column: i64, row: i64) -> Option<u8> {
     let random = hash([column / 10, row / 12, 0], 77);
     // At least one column and row from the cell's border: a large star does not cross it.
@@ -165,8 +165,8 @@ fn star(column: i64, row: i64) -> Option<u8> {
     }
 }
 
-/// Clouds of light: noise, looked up at a point that other noise has displaced. The displacement turns blots
-/// into swirls.
+/// Returns the colour of clouds of light: noise, looked up at a point that other noise has displaced. The
+/// displacement turns blots into swirls.
 fn nebula(point: [i64; 3]) -> u8 {
     // A cell of the coarsest noise is a third of the ball's width.
     let place = point.map(|c| (c * 3) >> 15);
@@ -218,7 +218,7 @@ mod tests {
         ])
     }
 
-    /// Nearby points differ by at most one shade, and rarely; a hue may change there.
+    /// Returns whether two colours are at most one shade apart. The hue may differ.
     fn near(a: u8, b: u8) -> bool {
         let shade = |colour| usize::from(colour - Ramp::Violet.shade(0)) % SHADES;
         shade(a).abs_diff(shade(b)) <= 1

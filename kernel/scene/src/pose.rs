@@ -29,7 +29,8 @@ impl Pose {
     /// Ticks of a whole turn: 12 s.
     const TURN: u32 = 720;
 
-    /// The default pose at a tick: a steady turn about an axis that is tipped and leaning like a globe's.
+    /// Returns the default pose at a tick: a steady turn about an axis that is tipped and leaning like a
+    /// globe's.
     pub fn at_tick(tick: u32) -> Self {
         Self {
             yaw: tick
@@ -43,12 +44,12 @@ impl Pose {
         }
     }
 
-    /// The rotation of the three angles.
+    /// Returns the rotation of the three angles.
     pub fn orientation(&self) -> Orientation {
         let (sy, cy) = (sin(self.yaw), cos(self.yaw));
         let (sp, cp) = (sin(self.pitch), cos(self.pitch));
         let (sr, cr) = (sin(self.roll), cos(self.roll));
-        // Rz(roll) Rx(pitch) Ry(yaw), written out; each entry is at most 1 but for rounding.
+        // Rz(roll) Rx(pitch) Ry(yaw), written out; each entry is at most 1, except for rounding.
         let (spsy, spcy) = (mul(sp, sy), mul(sp, cy));
         Orientation {
             rows: [

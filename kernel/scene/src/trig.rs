@@ -1,9 +1,9 @@
 //! Sine and cosine of angles given as 32-bit fractions of a turn.
 //!
-//! Polynomials, not a table: a pose needs six values. The turn is folded into an eighth. There the Taylor
-//! series to the ninth power (sine) and the tenth (cosine) have an error below 1.8e-9, two units of the
-//! result's 30 fraction bits; rounding adds as much again. Folding makes the quarter turns exact and keeps
-//! the four quadrants mirror images, so a solid turned by 90 degrees is the same solid.
+//! The functions use polynomials, not a table: a pose needs only six values. The turn is folded into an
+//! eighth. There the Taylor series to the ninth power (sine) and the tenth (cosine) have an error below
+//! 1.8e-9, two units of the result's 30 fraction bits; rounding adds as much again. Folding makes the quarter
+//! turns exact and keeps the four quadrants mirror images, so a solid turned by 90 degrees is the same solid.
 
 /// One, with the 30 fraction bits of every result here.
 pub const ONE_Q30: i64 = 1 << 30;
@@ -13,12 +13,12 @@ const EIGHTH: u32 = 1 << 29;
 /// pi / 2, a quarter turn in radians, 61 fraction bits.
 const HALF_PI_Q61: i128 = 3_622_009_729_038_561_421;
 
-/// Sine of `angle` / 2^32 turns, 30 fraction bits, -2^30 to 2^30.
+/// Returns the sine of `angle` / 2^32 turns, 30 fraction bits, -2^30 to 2^30.
 pub const fn sin(angle: u32) -> i64 {
     cos(angle.wrapping_sub(QUARTER))
 }
 
-/// Cosine of `angle` / 2^32 turns, 30 fraction bits, -2^30 to 2^30.
+/// Returns the cosine of `angle` / 2^32 turns, 30 fraction bits, -2^30 to 2^30.
 pub const fn cos(angle: u32) -> i64 {
     // cos is even: fold the second half of the turn onto the first, then into a quarter.
     let half = if angle >> 31 == 1 {
@@ -47,7 +47,7 @@ const fn radians(angle: u32) -> i64 {
     ((angle as i128 * HALF_PI_Q61 + (1 << 60)) >> 61) as i64
 }
 
-/// 1 - x^2/2 (1 - x^2/12 (1 - x^2/30 (1 - x^2/56))), by Horner.
+/// Returns 1 - x^2/2 (1 - x^2/12 (1 - x^2/30 (1 - x^2/56))), by Horner.
 const fn cos_series(x: i64) -> i64 {
     let x2 = mul(x, x);
     let mut sum = ONE_Q30 - x2 / 90;
@@ -57,7 +57,7 @@ const fn cos_series(x: i64) -> i64 {
     ONE_Q30 - mul(x2, sum) / 2
 }
 
-/// x (1 - x^2/6 (1 - x^2/20 (1 - x^2/42 (1 - x^2/72)))), by Horner.
+/// Returns x (1 - x^2/6 (1 - x^2/20 (1 - x^2/42 (1 - x^2/72)))), by Horner.
 const fn sin_series(x: i64) -> i64 {
     let x2 = mul(x, x);
     let mut sum = ONE_Q30 - x2 / 72;
@@ -67,7 +67,7 @@ const fn sin_series(x: i64) -> i64 {
     mul(x, sum)
 }
 
-/// The product of two numbers with 30 fraction bits, rounded; either is at most 2 in size.
+/// Returns the product of two numbers with 30 fraction bits, rounded; either is at most 2 in size.
 pub(crate) const fn mul(a: i64, b: i64) -> i64 {
     (a * b + (1 << 29)) >> 30
 }

@@ -9,8 +9,8 @@ use protocol::TICKS_PER_SECOND;
 /// out under `-icount shift=0`. The compiler moves no memory access across the call.
 pub fn now() -> u64 {
     let (low, high): (u32, u32);
-    // SAFETY: RDTSC changes two registers, and nothing forbids it to the kernel. Without `nomem` the compiler
-    // must assume that it accesses memory, which keeps other accesses in their place.
+    // SAFETY: RDTSC changes two registers, and the kernel is allowed to execute it. Without `nomem` the
+    // compiler must assume that the instruction accesses memory, which keeps other accesses in their place.
     unsafe {
         asm!("rdtsc", out("eax") low, out("edx") high, options(nostack, preserves_flags));
     }
@@ -25,13 +25,13 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Begins to compare counter and ticks.
+    /// Starts a stopwatch that compares the counter with the ticks from `tick` on.
     pub fn start(tick: u32) -> Self {
         Self { began: now(), tick }
     }
 
-    /// Returns the microseconds since the counter was at `since`. The result is more exact the longer ago the
-    /// start is: within 2 % after a second.
+    /// Returns the microseconds since the counter was at `since`. The longer the stopwatch runs, the more
+    /// exact the result is: within 2 % after a second.
     pub fn micros(&self, since: u64, tick: u32) -> u32 {
         let now = now();
         let ticks = tick.wrapping_sub(self.tick);
@@ -42,7 +42,7 @@ impl Stopwatch {
     }
 }
 
-/// Carries out `count` instructions in a loop of two, plus the same few around the loop for every count.
+/// Carries out `count` instructions in a loop of two, plus a few around the loop, the same for every count.
 #[inline(never)]
 pub fn instructions(count: u32) {
     // SAFETY: the loop only counts its operand register down to zero.

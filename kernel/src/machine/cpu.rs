@@ -95,7 +95,8 @@ pub fn init(stack_bottom: u64) {
     // SAFETY: the selector is from the table just loaded.
     unsafe { CS::set_reg(GDT.code) };
     for set in [SS::set_reg, DS::set_reg, ES::set_reg] {
-        // SAFETY: as above. The next IRET would look up an old selector left in SS in the new table.
+        // SAFETY: as above. If SS kept its old selector, the next IRET would look that selector up in the new
+        // table.
         unsafe { set(GDT.data) };
     }
     // SAFETY: as above, and the segment is a static.

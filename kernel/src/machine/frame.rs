@@ -13,13 +13,13 @@ pub struct Frame {
     pub error: u64,
     /// Instruction pointer at the exception or interrupt.
     pub rip: u64,
-    /// Code segment there.
+    /// Code segment at `rip`.
     pub cs: u64,
-    /// Flags there.
+    /// Flags at the exception or interrupt.
     pub rflags: u64,
-    /// Stack pointer there.
+    /// Stack pointer at the exception or interrupt.
     pub rsp: u64,
-    /// Stack segment there.
+    /// Stack segment at the exception or interrupt.
     pub ss: u64,
 }
 

@@ -36,8 +36,8 @@ const OFF: u8 = 0x02;
 /// Configuration: stop the clocks of keyboard and mouse.
 const STOPPED: u8 = 0x30;
 
-/// Polls of a status bit before the controller is given up. The controller answers within some milliseconds,
-/// and a poll lasts about a microsecond.
+/// Polls of a status bit before the kernel gives the controller up. The controller answers within some
+/// milliseconds, and a poll lasts about a microsecond.
 const POLLS: u32 = 100_000;
 
 /// Codes that can wait for the program: as many as a keyboard sends in three seconds.
@@ -90,8 +90,8 @@ pub fn lost() -> u32 {
     LOST.load(Ordering::Relaxed)
 }
 
-/// The interrupt handler's part: fetches what the controller has. It fetches everything, because the request
-/// is an edge, but no more than the ring holds, in case the port reads nonsense.
+/// The interrupt handler's part: fetches what the controller has. It fetches every waiting code, because the
+/// request is an edge, but no more codes than the ring holds, in case the port reads nonsense.
 pub(super) fn handle_interrupt() {
     for _ in 0..RING {
         let status = status();

@@ -9,8 +9,8 @@ use protocol::{ADAPTER, END_OF_REPORT, EXCEPTION, Exit, PANIC};
 use super::frame::Frame;
 use super::serial::Unlocked;
 
-/// Whether a report has begun. A failure during a report ends the machine at once, so the first failure is
-/// the one that the host reads.
+/// Whether a report has begun. A failure during a report ends the machine at once, so the host reads the
+/// first failure.
 static REPORTING: AtomicBool = AtomicBool::new(false);
 
 /// Reports a panic and ends the machine.

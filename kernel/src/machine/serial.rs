@@ -59,8 +59,8 @@ impl Uart for Com1 {
 
 /// Finds the port and sets it up. A machine without the port still runs, without output.
 ///
-/// It sets 115 200 baud, 8-N-1 and FIFO on, with no interrupt yet ([`listen`]). It leaves modem control as it
-/// is.
+/// It sets 115 200 baud, 8-N-1 and FIFO on, and leaves modem control as it is. [`listen`] switches the
+/// interrupt on.
 pub fn init() {
     let Some(mut uart) = port() else { return };
     let config = Config {

@@ -1,6 +1,6 @@
 //! Ticks, [`TICKS_PER_SECOND`] of them, from the programmable interval timer.
 //!
-//! The VGA's retrace cannot pace anything here: QEMU toggles it at every read.
+//! The VGA's retrace cannot serve as a clock: QEMU toggles it at every read.
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -48,7 +48,7 @@ pub struct Countdown {
 }
 
 impl Countdown {
-    /// Reads of the counter until a timer that does not count is given up.
+    /// Reads of the counter before a timer that does not count is given up.
     const READS: u32 = 50_000_000;
     /// Command that latches channel 0's count.
     const LATCH: u8 = 0x00;

@@ -1,5 +1,5 @@
-//! The affine mapper's walks: compares their coordinates with the single affine map of a triangle. The oracle
-//! checks which pixels they cover (`tests/oracle`).
+//! The affine mapper's steppers: compares their coordinates with the single affine map of a triangle. The
+//! oracle checks which pixels they cover (`tests/oracle`).
 
 use std::collections::HashMap;
 
@@ -7,22 +7,22 @@ use texmap::mappers::affine::{AffineMap, Sides};
 use texmap::scan::{self, Span};
 use texmap::{AffineStepper, Axis, Dropped, Texture, Vertex};
 
-/// Makes the walk down a span.
-type Walker = Box<dyn Fn(&Span) -> AffineStepper>;
-/// Makes a polygon's walker; `None` if the rule does not apply to the polygon.
-type Rule = fn(&[Vertex], &Texture<'_>) -> Option<Walker>;
+/// Makes the stepper down a span.
+type MakeStepper = Box<dyn Fn(&Span) -> AffineStepper>;
+/// Returns the function that makes a polygon's steppers, or `None` if the rule does not apply to the polygon.
+type Rule = fn(&[Vertex], &Texture<'_>) -> Option<MakeStepper>;
 
-fn by_sides(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+fn by_sides(polygon: &[Vertex], texture: &Texture<'_>) -> Option<MakeStepper> {
     let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
     Some(Box::new(move |span| sides.stepper(span)))
 }
 
-fn by_half_steps(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+fn by_half_steps(polygon: &[Vertex], texture: &Texture<'_>) -> Option<MakeStepper> {
     let sides = Sides::new(polygon, texture, Axis::Down).expect("legal polygon");
     Some(Box::new(move |span| sides.half_step(span)))
 }
 
-fn by_map(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Walker> {
+fn by_map(polygon: &[Vertex], texture: &Texture<'_>) -> Option<MakeStepper> {
     let map = AffineMap::new(polygon, texture)?;
     Some(Box::new(move |span| map.stepper(span)))
 }
@@ -35,7 +35,7 @@ fn steppers(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> Vec<(Span,
     steppers
 }
 
-/// Pixels of `polygon`, each with its coordinates; panics on a coordinate outside the texture.
+/// Returns pixels of `polygon`, each with its coordinates; panics on a coordinate outside the texture.
 fn drawn(polygon: &[Vertex], texture: &Texture<'_>, rule: Rule) -> HashMap<(i32, i32), (i32, i32)> {
     let (last_u, last_v) = texture.last();
     let mut pixels = HashMap::new();
@@ -59,7 +59,7 @@ fn vertex(
     snap: i32,
     size: (u16, u16),
 ) -> Vertex {
-    // Multiples of `snap` put vertices on pixel centres and edges on top of each other.
+    // Multiples of `snap` bring vertices onto pixel centres, and edges on top of each other.
     let place = |random: &mut fastrand::Rng, centre: i32| {
         centre + random.i32(-spread..=spread) / snap * snap
     };
@@ -73,7 +73,7 @@ fn vertex(
 }
 
 #[test]
-fn every_walk_stays_inside_the_texture() {
+fn every_stepper_stays_inside_the_texture() {
     let mut random = seeded::generator();
     let texels = vec![0; 256 * 256];
     let (mut pixels, mut mapped) = (0, 0);
@@ -213,8 +213,8 @@ fn a_small_motion_moves_no_texel_by_more_than_its_bound() {
     );
 }
 
-/// The limits of the legal range: half of the texture's width to the pixel, a corner as far out as allowed, a
-/// tiny area. One step further no map exists.
+/// The limits of the legal range: half of the texture's width per pixel, a corner as far out as allowed, a
+/// tiny area. One step further out, no map exists.
 #[test]
 fn a_map_holds_at_the_ends_of_its_range() {
     let texels = vec![0; 256 * 256];

@@ -27,7 +27,7 @@ struct Triangle {
 }
 
 impl Triangle {
-    /// A triangle from its corners: pixels from the screen's centre, and depths, 16.16.
+    /// Returns a triangle with these corners: pixels from the screen's centre, and depths, 16.16.
     fn new(corners: [(f64, f64, i32); 3], texture: [(i32, i32); 3]) -> Self {
         let anchors = [0, 1, 2].map(|i| {
             let ((x, y, z), (u, v)) = (corners[i], texture[i]);
@@ -58,8 +58,9 @@ impl Triangle {
         Self { polygon, anchors }
     }
 
-    /// The triangle's plane seen through two rectangles, joined by a side that is walked there and back. The
-    /// columns between have no pixel, and where the rectangles face each other, rows have two spans.
+    /// Returns the triangle's plane seen through two rectangles, joined by a side that the outline follows
+    /// there and back. The columns between have no pixel, and where the rectangles face each other, rows have
+    /// two spans.
     fn through_windows(mut self, random: &mut fastrand::Rng) -> Self {
         let (x, y) = (random.i32(0..150), random.i32(0..100));
         let (gap, tall) = (random.i32(1..40), random.i32(40..100));
@@ -76,7 +77,8 @@ impl Triangle {
         self
     }
 
-    /// A triangle anywhere on the screen and a little beyond, with a depth ratio of up to 2^`octaves`.
+    /// Returns a triangle anywhere on the screen and a little beyond, with a depth ratio of up to
+    /// 2^`octaves`.
     fn any(random: &mut fastrand::Rng, octaves: f64) -> Self {
         let corner = |random: &mut fastrand::Rng| {
             let at = |random: &mut fastrand::Rng, reach: i32| f64::from(random.i32(-reach..=reach));
@@ -106,16 +108,16 @@ fn at(form: &Form, x: f64, y: f64) -> f64 {
     form.origin as f64 + form.right as f64 * x + form.down as f64 * y
 }
 
-/// u or v at any point of the screen, 16.16, not clamped; `None` where the plane is not visible.
+/// Returns u or v at any point of the screen, 16.16, not clamped; `None` where the plane is not visible.
 fn quotient(plane: &Plane, k: usize, x: f64, y: f64) -> Option<f64> {
     let c = at(&plane.c, x, y);
     let n = at([&plane.a, &plane.b][k], x, y);
     (c > 0.0).then(|| n / c * 65536.0)
 }
 
-/// Compares the coordinates of every pixel of a face with the exact ones. `bound` returns the largest allowed
-/// error for u or v (0 or 1), at a pixel and its number in its job, if a limit exists. Returns the number of
-/// pixels, and the worst error as a fraction of its bound, among bounds of at least `least`.
+/// Compares the coordinates of every pixel of a face with the exact coordinates. `bound` returns the largest
+/// allowed error for u or v (0 or 1), at a pixel and its number in its job, if a limit exists. Returns the
+/// number of pixels, and the worst error as a fraction of its bound, among bounds of at least `least`.
 fn compare(
     mapper: Mapper,
     least: f64,
@@ -153,8 +155,9 @@ fn compare(
     (pixels, worst)
 }
 
-/// A triangle in a wall, with a side straight down in space, or in a floor, with a side straight across.
-fn level_triangle(random: &mut fastrand::Rng, wall: bool, upright: bool) -> Triangle {
+/// Returns a triangle in a wall, with a side straight down in space, or in a floor, with a side straight
+/// across.
+fn constant_z_triangle(random: &mut fastrand::Rng, wall: bool, upright: bool) -> Triangle {
     let mut triangle = Triangle::any(random, 3.0);
     let [a, b, _] = &mut triangle.anchors;
     b.position = a.position;
@@ -172,7 +175,7 @@ fn a_wall_and_a_floor_are_exact_but_for_drift() {
     let (mut pixels, mut walls, mut affine, mut exact, mut worst) = (0, 0, 0, 0, 0f64);
     for case in 0..seeded::cases(240) {
         let (wall, upright) = (case % 2 == 0, case % 3 == 0);
-        let mut triangle = level_triangle(&mut random, wall, upright);
+        let mut triangle = constant_z_triangle(&mut random, wall, upright);
         if case % 5 == 0 {
             triangle = triangle.through_windows(&mut random);
         }
@@ -202,7 +205,7 @@ fn a_wall_and_a_floor_are_exact_but_for_drift() {
     println!("{walls} walls, {affine} affine and {exact} exact spans");
     if seeded::is_whole() {
         assert!(pixels > 500_000 && worst > 0.8 && walls > 2_000 && affine > 5_000);
-        // Hardly any of a wall's visible spans are left to the exact mapper.
+        // The exact mapper draws hardly any of a wall's visible spans.
         assert!(exact < affine / 100);
     }
 }
@@ -224,7 +227,7 @@ fn where_no_depth_is_constant_level_is_exact() {
     assert!(planes > 40);
 }
 
-/// How far u or v moves when the point moves by [`free_direction::LARGEST_DISTANCE`] across the line.
+/// Returns how far u or v moves when the point moves by [`free_direction::LARGEST_DISTANCE`] across the line.
 fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64> {
     let (x, y) = (f64::from(x), f64::from(y));
     let here = quotient(plane, k, x, y)?;
@@ -232,8 +235,8 @@ fn across(plane: &Plane, axis: Axis, k: usize, (x, y): (u16, u16)) -> Option<f64
         Axis::Right => quotient(plane, k, x, y + by),
         Axis::Down => quotient(plane, k, x + by, y),
     };
-    let aside = f64::from(free_direction::LARGEST_DISTANCE) / 16384.0;
-    let [one, other] = [moved(-aside)?, moved(aside)?];
+    let distance = f64::from(free_direction::LARGEST_DISTANCE) / 16384.0;
+    let [one, other] = [moved(-distance)?, moved(distance)?];
     Some((one - here).abs().max((other - here).abs()))
 }
 
@@ -279,7 +282,7 @@ fn the_free_direction_is_off_by_half_a_pixel_across_at_most_and_by_that_somewher
 fn a_free_line_without_slope_goes_through_the_centres() {
     let mut random = seeded::generator();
     for case in 0..100 {
-        let triangle = level_triangle(&mut random, case % 2 == 0, false);
+        let triangle = constant_z_triangle(&mut random, case % 2 == 0, false);
         compare(
             Mapper::FreeDirection,
             QUARTER,
@@ -289,8 +292,8 @@ fn a_free_line_without_slope_goes_through_the_centres() {
     }
 }
 
-/// The error of linear interpolation between two points whose depth ratio is r: |du| (sqrt r - 1)/(sqrt r +
-/// 1).
+/// Returns the error of linear interpolation between two points whose depth ratio is r:
+/// |du| (sqrt r - 1)/(sqrt r + 1).
 fn linear(plane: &Plane, k: usize, (x, y): (f64, f64), (to_x, to_y): (f64, f64)) -> Option<f64> {
     let du = quotient(plane, k, to_x, to_y)? - quotient(plane, k, x, y)?;
     let (c, to_c) = (at(&plane.c, x, y), at(&plane.c, to_x, to_y));
@@ -450,7 +453,7 @@ fn plane_by_plane_they_draw_what_they_draw_polygon_by_polygon() {
     let texture = Texture::padded(&texels, SIZE.0, SIZE.1).unwrap();
     for case in 0..seeded::cases(30) {
         let triangle = match case % 3 {
-            0 => level_triangle(&mut random, case % 2 == 0, case % 4 < 2),
+            0 => constant_z_triangle(&mut random, case % 2 == 0, case % 4 < 2),
             _ => Triangle::any(&mut random, 3.0),
         };
         for mapper in MAPPERS {

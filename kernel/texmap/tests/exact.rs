@@ -46,9 +46,9 @@ fn every_texel_is_the_floor_of_the_quotient() {
     }
 }
 
-/// The plane's forms are the exact forms after one shift, with an error of at most [`ROUNDING`]. So the quotient is
-/// off by at most ROUNDING (1 + u) / c', u in texels: the numerator's error, plus the denominator's error times the
-/// quotient.
+/// The plane's forms are the exact forms after one shift, with an error of at most [`ROUNDING`]. So the
+/// quotient is off by at most ROUNDING (1 + u) / c', u in texels: the numerator's error, plus the
+/// denominator's error times the quotient.
 #[test]
 fn cutting_the_plane_moves_no_form_by_more_than_its_bound() {
     let mut random = seeded::generator();

@@ -11,7 +11,7 @@ use texmap::{AffineStepper, Face, Loop, Mapper, Texture, Vertex};
 /// No texel has this colour: pixels that are not drawn keep it.
 const UNTOUCHED: u8 = 0;
 
-/// The loops that wrap any walk around.
+/// The loops that wrap any stepper around.
 const MASKED: [Loop; 3] = [Loop::Shifts, Loop::OneAccumulator, Loop::Extract];
 
 /// Draws a column, with tuned instructions or portably.
@@ -22,7 +22,7 @@ fn texels(random: &mut fastrand::Rng, len: usize) -> Vec<u8> {
     (0..len).map(|_| random.u8(UNTOUCHED + 1..)).collect()
 }
 
-/// Room for the texels of any texture.
+/// Returns random texels, enough for any texture.
 fn all_texels(random: &mut fastrand::Rng) -> Vec<u8> {
     texels(random, 256 * 256)
 }
@@ -45,8 +45,8 @@ fn side(random: &mut fastrand::Rng) -> u16 {
     }
 }
 
-/// A start and a step that stay inside `size` texels for `len` pixels. Whole texels, zero fractions, borders
-/// and zero steps are more frequent than by chance.
+/// Returns a start and a step that stay inside `size` texels for `len` pixels. Whole texels, zero fractions,
+/// borders and zero steps are more frequent than by chance.
 fn legal(random: &mut fastrand::Rng, size: u16, len: u16) -> (i32, i32) {
     let last = (i32::from(size) << 16) - 1;
     let mut place = || match random.u8(..6) {
@@ -66,7 +66,7 @@ fn legal(random: &mut fastrand::Rng, size: u16, len: u16) -> (i32, i32) {
         0 => (start, 0),
         // Rounded towards zero, to whole texels.
         1 => (start, step / 0x1_0000 * 0x1_0000),
-        // A step of one unit of the last place.
+        // A step of one unit in the last place.
         2 => (
             start.clamp(240.min(last), (last - 240).max(0)),
             step.signum(),
@@ -84,7 +84,7 @@ fn is_legal(stepper: AffineStepper, len: u16, texture: &Texture<'_>) -> bool {
     inside(stepper.u, stepper.du, last_u) && inside(stepper.v, stepper.dv, last_v)
 }
 
-fn legal_walk(random: &mut fastrand::Rng, texture: &Texture<'_>, len: u16) -> AffineStepper {
+fn legal_stepper(random: &mut fastrand::Rng, texture: &Texture<'_>, len: u16) -> AffineStepper {
     loop {
         let (u, du) = legal(random, texture.width(), len);
         let (v, dv) = legal(random, texture.height(), len);
@@ -95,7 +95,7 @@ fn legal_walk(random: &mut fastrand::Rng, texture: &Texture<'_>, len: u16) -> Af
     }
 }
 
-/// The texel of pixel `i`, from the definition; coordinates outside wrap around the padded sides.
+/// Returns the texel of pixel `i`, from the definition; coordinates outside wrap around the padded sides.
 fn texel(texture: &Texture<'_>, stepper: AffineStepper, i: usize) -> u8 {
     let at = |at: i32, step: i32| (i64::from(at) + i as i64 * i64::from(step)) >> 16;
     let (column, row) = (at(stepper.u, stepper.du), at(stepper.v, stepper.dv));
@@ -185,7 +185,7 @@ fn every_loop_draws_its_clear_twin() {
         };
         let size = (side(random), side(random));
         let texture = texture(&texels, size, random.bool());
-        let stepper = legal_walk(random, &texture, len);
+        let stepper = legal_stepper(random, &texture, len);
         for by in Loop::ALL {
             for draw in DRAWS {
                 check(draw, by, &texture, stepper, len, page.anywhere(random, len));
@@ -204,7 +204,7 @@ fn a_negative_whole_step_carries_nothing() {
     for pitch in 0..=8 {
         let texture = texture(&texels, (1 << pitch, 256), true);
         for (du, dv) in [(0, -1), (-1, 0), (-1, -1), (1, -1), (-1, 1)] {
-            // As many pixels as the texture has room for.
+            // The number of pixels that fit in the texture.
             let room = |step: i32, size: u16| if step == 0 { 240 } else { size.min(240) };
             let len = room(du, texture.width()).min(room(dv, texture.height()));
             let mut start = |step: i32, size: u16| {
@@ -235,7 +235,7 @@ fn a_negative_whole_step_carries_nothing() {
 }
 
 #[test]
-fn masked_loops_wrap_any_walk_around_the_padding() {
+fn masked_loops_wrap_any_stepper_around_the_padding() {
     let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut page = Page::new();
@@ -265,13 +265,13 @@ fn masked_loops_wrap_any_walk_around_the_padding() {
 }
 
 #[test]
-fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
+fn a_stepper_that_leaves_the_texture_panics_before_it_reads() {
     let random = &mut seeded::generator();
     let texels = all_texels(random);
     for case in 0..seeded::cases(200) {
         let texture = texture(&texels, (side(random), side(random)), random.bool());
         let len = random.u16(2..=240);
-        let mut stepper = legal_walk(random, &texture, len);
+        let mut stepper = legal_stepper(random, &texture, len);
         let (last_u, last_v) = texture.last();
         // One bit outside, at the first pixel or at the last; or far away.
         match case % 8 {
@@ -308,17 +308,17 @@ fn a_walk_that_leaves_the_texture_panics_before_it_reads() {
     }
 }
 
-/// A packed walk's error grows by at most one unit of the last place at every pixel, and the walk stays
+/// A packed stepper's error grows by at most one unit in the last place per pixel, and the stepper stays
 /// inside the texture.
 #[test]
-fn a_packed_walk_drifts_within_its_bound() {
+fn a_packed_stepper_drifts_within_its_bound() {
     let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut worst = 0;
     for _ in 0..20_000 {
         let len = random.u16(1..=240);
         let texture = texture(&texels, (side(random), side(random)), false);
-        let stepper = legal_walk(random, &texture, len);
+        let stepper = legal_stepper(random, &texture, len);
         let packed = Loop::Packed.effective(stepper);
         assert!(
             is_legal(packed, len, &texture),
@@ -334,7 +334,7 @@ fn a_packed_walk_drifts_within_its_bound() {
             worst = worst.max(off.abs());
         }
     }
-    // The walk does drift, so the reference implementation has to know about it.
+    // The stepper does drift, so the reference implementation has to know about it.
     assert!(worst > 200, "{worst}");
     for by in Loop::ALL {
         let stepper = AffineStepper {
@@ -413,9 +413,9 @@ fn an_empty_column_is_not_drawn() {
     assert_eq!(byte, UNTOUCHED);
 }
 
-/// Whole faces, mapped by name: a job draws the texels that it says it reads.
+/// Whole faces, mapped by name: a job draws the texels that `Job::pixels` yields.
 #[test]
-fn jobs_say_what_every_loop_reads() {
+fn jobs_yield_what_every_loop_reads() {
     let random = &mut seeded::generator();
     let texels = all_texels(random);
     let mut drifted = 0;

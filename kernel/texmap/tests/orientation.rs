@@ -67,8 +67,8 @@ fn draw(corners: &Corners, by: Mapper) -> PlanarBuffer {
     page
 }
 
-/// Whether a pixel's centre lies on an edge, or on a border between texels. At a single depth the coordinates
-/// are affine: u at the centre, in texels, is (centre - P) x N / (M x N), times SIDE.
+/// Returns whether a pixel's centre lies on an edge, or on a border between texels. At a single depth the
+/// coordinates are affine: u at the centre, in texels, is (centre - P) x N / (M x N), times SIDE.
 fn on_a_border(corners: &Corners, centre: Place) -> bool {
     let minus = |a: Place, b: Place| (i64::from(a.0 - b.0), i64::from(a.1 - b.1));
     let cross = |a: (i64, i64), b: (i64, i64)| a.0 * b.1 - a.1 * b.0;
@@ -142,7 +142,7 @@ fn a_turned_polygon_gives_the_turned_frame() {
     assert_eq!(others, 0);
 }
 
-/// Steps are rounded towards zero, so a walk in the other direction has the opposite error: at most 2^-8
+/// Steps are rounded towards zero, so a stepper in the other direction has the opposite error: at most 2^-8
 /// texel.
 #[test]
 fn affine_columns_shift_a_texture_by_next_to_nothing() {

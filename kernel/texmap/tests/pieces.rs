@@ -63,7 +63,7 @@ fn a_quotient_is_less_than_it_should_be_by_below_a_unit_and_three_128ths() {
     println!("less by {most} units at most");
     assert!(
         !seeded::is_whole() || most > 1.0,
-        "the bound is what it says only if a unit is passed"
+        "the bound is tight only if an error exceeds one unit"
     );
 }
 

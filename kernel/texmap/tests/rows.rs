@@ -10,8 +10,8 @@ use faces::*;
 
 const ROWS: [Rows; 3] = [Rows::Multiply, Rows::Steps, Rows::Passes];
 
-/// Port writes of the three mappers, polygon by polygon: one a pixel, one a pixel, and one for each plane
-/// that a row touches.
+/// Port writes of the three mappers, polygon by polygon: the first two write once per pixel, and the third
+/// once for each plane that a row touches.
 #[test]
 fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
     let mut random = seeded::generator();
@@ -56,7 +56,7 @@ fn the_row_mappers_draw_the_same_bytes_by_the_writes_that_they_are_known_for() {
 /// A pixel, its coordinates, and its number in the span.
 type Stepped = ((i64, i64), [i32; 2], u16);
 
-/// The coordinates by half steps at each pixel of a triangle, along rows or columns.
+/// Returns the coordinates by half steps at each pixel of a triangle, along rows or columns.
 fn half_steps(polygon: &[Vertex], texture: &Texture<'_>, axis: Axis) -> Vec<Stepped> {
     let sides = Sides::new(polygon, texture, axis).unwrap();
     let mut pixels = Vec::new();

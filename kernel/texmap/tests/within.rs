@@ -1,4 +1,5 @@
-//! The mappers that keep to an error: checks that they do, and that no cheaper method of the table would.
+//! The mappers that keep to an error: checks that they do, and that no cheaper method of the table would keep
+//! to the error.
 
 mod random;
 
@@ -25,8 +26,8 @@ struct Seen {
     anchors: [Anchor; 3],
 }
 
-/// A face on a part of a plane, with a rectangle of the texture: small facets, walls, floors to the horizon,
-/// and anything.
+/// Returns a face on a part of a plane, with a rectangle of the texture: small facets, walls, floors to the
+/// horizon, and anything.
 fn seen(random: &mut fastrand::Rng, size: (u16, u16)) -> Option<Seen> {
     let kind = random.u8(0..4);
     let (w, h) = (i32::from(size.0) << 16, i32::from(size.1) << 16);
@@ -159,12 +160,12 @@ fn enough(enough: bool) -> ControlFlow<()> {
     }
 }
 
-/// The forms along a span.
+/// Returns the forms along a span.
 fn forms(plane: &Plane, axis: Axis, span: &Span<()>) -> PlaneStepper {
     PlaneStepper::along(plane, axis, span.line, span.first)
 }
 
-/// The walk of another walk's pixels from `first` on.
+/// Returns the stepper that starts at pixel `first` of `stepper`.
 fn from(stepper: &PlaneStepper, first: u16) -> PlaneStepper {
     PlaneStepper {
         at: stepper.after(first),
@@ -172,7 +173,7 @@ fn from(stepper: &PlaneStepper, first: u16) -> PlaneStepper {
     }
 }
 
-/// Whether all of a span may be one line, by the closed form.
+/// Returns whether all of a span may be one line, by the closed form.
 fn keeps(stepper: &PlaneStepper, len: u16, tolerance: Tolerance, texture: &Texture<'_>) -> bool {
     let first = AdaptivePieces::new(stepper, len, None, tolerance, texture).next();
     first.is_some_and(|piece| piece.len == len)
@@ -230,8 +231,9 @@ fn none_cheaper(
         // Pixels for which a quadratic of 32 pixels would have needed three quarters of the time.
         let curves = (done..len - 1).step_by(32).filter(|&at| at + 32 < len);
         let first = |at: u16| if backward { len - 1 - at - 32 } else { at };
-        let bends = curves.map(|at| SpanBound::new(&from(stepper, first(at)), 33, texture));
-        let curved = bends.filter(|bend| bend.quadratic(Subdivision::Whole) <= tolerance.units());
+        let bounds = curves.map(|at| SpanBound::new(&from(stepper, first(at)), 33, texture));
+        let curved =
+            bounds.filter(|bound| bound.quadratic(Subdivision::Whole) <= tolerance.units());
         let curved = 32 * curved.count() as u16;
         count("exact, a curve would do", curved);
         count("exact", rest - curved);
@@ -239,7 +241,7 @@ fn none_cheaper(
 }
 
 /// Checks that, in rows and in columns, no pixel of any face exceeds the tolerance, and that no cheaper
-/// method than the chosen one would do.
+/// method than the chosen method would keep to it.
 fn within(least: u32, tolerance: &str) {
     let least = seeded::cases(least as usize) as u32;
     let mut random = seeded::generator();
@@ -347,7 +349,7 @@ fn a_shorter_piece_would_cost_more_than_quotients() {
     assert!(LENGTHS.iter().all(|length| length % 4 == 0));
 }
 
-/// The cost of an axis, by the pieces into which its spans are cut, in pixels of a line.
+/// Returns the cost of an axis, by the pieces into which its spans are cut, in pixels of a line.
 fn cost(face: &Face<'_>, axis: Axis, tolerance: Tolerance, texture: &Texture<'_>) -> u64 {
     let (plane, piece) = (
         face.plane(),
@@ -437,8 +439,8 @@ fn a_million_affine_columns_keep_to_their_closed_form() {
 /// The error bound of the affine mapper in a polygon, in units of 2^-16 texel: see [`Sides::stepper`].
 ///
 /// A corner's own coordinates differ slightly from the quotients at the place where the corner is snapped to.
-/// Between two corners a coordinate is a chord along the side, and down the column it is another chord between
-/// points of two sides: these errors add up.
+/// Between two corners a coordinate is a chord along the side, and down the column it is another chord
+/// between points of two sides: these errors add up.
 struct AffineBound {
     plane: Plane,
     /// The largest error of a coordinate on any side, including the corners.

@@ -29,7 +29,7 @@ struct Solid {
     faces: [MeshFace; FACES],
 }
 
-/// Built by the compiler: the boot image contains it, and nothing is computed at start-up.
+/// The compiler builds the solid: the boot image contains it, and nothing is computed at start-up.
 static SOLID: Solid = build();
 
 /// The ball.
@@ -73,7 +73,7 @@ pub fn paint_ball(texels: &mut [u8; TEXELS]) -> Texture<'_> {
     Texture::new(texels, TEXTURE_WIDTH, TEXTURE_HEIGHT).expect("there are TEXELS texels")
 }
 
-/// The ball before its background. `textures` are those that [`paint_ball`] painted.
+/// Returns the ball in front of its background. `textures` are those that [`paint_ball`] painted.
 pub fn ball<'t>(textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
     const _: () = assert!(BACKGROUND.len() == HEIGHT);
     Scene {
@@ -87,8 +87,8 @@ pub fn ball<'t>(textures: &'t [Texture<'t>]) -> Scene<'static, 't> {
     }
 }
 
-/// The unit vector at a longitude (0 faces the viewer, growing to the right) and a polar angle (0 is the top,
-/// half a turn the bottom), 30 fraction bits.
+/// Returns the unit vector at a longitude (0 faces the viewer, growing to the right) and a polar angle (0 is
+/// the top, half a turn the bottom), 30 fraction bits.
 const fn on_sphere(longitude: u32, polar: u32) -> [i64; 3] {
     let ring = sin(polar);
     [
@@ -117,8 +117,8 @@ const fn polar(ring: usize) -> u32 {
     ((ring as u64 * (1 << 31)) / RINGS as u64) as u32
 }
 
-/// The corner at ring line `ring` (0 and RINGS are the poles) and meridian `segment`. Its texture coordinate
-/// u is `half` half segments: a pole uses the middle of its facet.
+/// Returns the corner at ring line `ring` (0 and RINGS are the poles) and meridian `segment`. Its texture
+/// coordinate u is `half` half segments: a pole uses the middle of its facet.
 const fn corner(ring: usize, segment: usize, half: usize) -> Corner {
     let vertex = if ring == 0 {
         0
@@ -217,8 +217,8 @@ const fn build() -> Solid {
     }
 }
 
-/// The meridian on the right of a segment. The last one ends at a whole turn, which does not fit 32 bits, so
-/// it is one unit short.
+/// Returns the meridian on the right of a segment. The last segment ends at a whole turn, which does not fit
+/// 32 bits, so its meridian is one unit short.
 const fn longitude_end(segment: usize) -> u32 {
     if segment + 1 == SEGMENTS {
         u32::MAX

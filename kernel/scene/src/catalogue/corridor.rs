@@ -68,8 +68,8 @@ pub const MOIRE: Entry<'static> = Entry {
 /// A tile of the corridor's floor and walls, 16.16 units.
 const STEP: i32 = 1 << 16;
 
-/// One tile forward in three quarters of a second, and a look to either side. The walk is seamless, since all
-/// tiles are alike.
+/// Returns the pose at a tick: one tile forward in three quarters of a second, with a look to either side.
+/// The motion is seamless, since all tiles are alike.
 fn stroll(tick: u32) -> Pose {
     const TICKS: u32 = 45;
     Pose {
@@ -201,7 +201,8 @@ fn paint(texels: &mut [u8; MAX_TEXELS]) -> Textures<'_> {
     [tiled(floor, 2 * TILE, most), tiled(wall, most, 2 * TILE)].into()
 }
 
-/// Marble slabs, dark and light, with gold lines between them and a diamond where four meet.
+/// Returns the colour of a texel of marble slabs, dark and light, with gold lines between them and a diamond
+/// where four of them meet.
 fn slabs(i: i64, j: i64) -> u8 {
     const HALF: i64 = TILE as i64 / 2;
     let from_line = |k: i64| (k % HALF).min(HALF - 1 - k % HALF);
@@ -229,7 +230,8 @@ fn slabs(i: i64, j: i64) -> u8 {
     }
 }
 
-/// Courses of stone, each offset by half a stone from the one below, and a frieze.
+/// Returns the colour of a texel of courses of stone, each offset by half a stone from the course below, and
+/// a frieze.
 fn courses(i: i64, j: i64) -> u8 {
     const COURSE: i64 = 16;
     let (course, y) = (j / COURSE, j % COURSE);

@@ -36,7 +36,7 @@ struct Solid {
     faces: [MeshFace; FACES],
 }
 
-/// Built by the compiler.
+/// The compiler builds the solid.
 static SOLID: Solid = build();
 
 /// The knot.
@@ -65,8 +65,8 @@ const MESH: Mesh<'static> = Mesh {
     convex: false,
 };
 
-/// A point on the tube: the centre of its ring and the direction outward, 30 fraction bits. `along` and
-/// `around` are fractions of the whole way.
+/// Returns a point on the tube: the centre of its ring and the direction outward, 30 fraction bits. `along`
+/// is a fraction of the whole curve, and `around` of a whole turn.
 const fn place(along: u32, around: u32) -> ([i64; 3], [i64; 3]) {
     let (phi, psi) = (along.wrapping_mul(2), along.wrapping_mul(3));
     let (cos_phi, sin_phi) = (cos(phi), sin(phi));
@@ -104,7 +104,7 @@ const fn place(along: u32, around: u32) -> ([i64; 3], [i64; 3]) {
     (middle, out)
 }
 
-/// `i / n` of a turn.
+/// Returns `i / n` of a turn.
 const fn turn(i: usize, n: usize) -> u32 {
     (((i as u64) << 32) / n as u64) as u32
 }
@@ -119,7 +119,7 @@ const fn round(v: [i64; 3], bits: u32) -> Vec3 {
     ]
 }
 
-/// The corner of ring `ring` and side `side`, with its texture coordinates counted from ring `from`.
+/// Returns the corner of ring `ring` and side `side`, with its texture coordinates counted from ring `from`.
 const fn corner(ring: usize, side: usize, from: usize) -> Corner {
     Corner {
         vertex: (ring % RINGS * SIDES + side % SIDES) as u16,
@@ -188,7 +188,8 @@ fn paint(texels: &mut [u8; MAX_TEXELS]) -> Texture<'_> {
     surfaces::paint(texels, ribbon)
 }
 
-/// A gold band around enamel, wound once about the tube, with pearls between two wires.
+/// Returns the colour of a texel of a gold band around enamel, wound once about the tube, with pearls between
+/// two wires.
 fn ribbon(i: i64, j: i64) -> u8 {
     const AROUND: i64 = SIDE as i64;
     // Across the band, 0 to 255: it is wound once for each repetition.

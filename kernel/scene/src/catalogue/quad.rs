@@ -3,8 +3,8 @@
 use super::surfaces::SIDE;
 use crate::{Corner, Mesh, MeshFace, Vec3};
 
-/// A square that lies `y` below the origin and extends by `half` to either side, to the front and to the
-/// back. The texture's top is far away, so that its text reads from the near edge.
+/// Returns a square that lies `y` below the origin and extends by `half` to either side, to the front and to
+/// the back. The texture's top is far away, so that its text reads from the near edge.
 pub const fn lying(half: i32, y: i32) -> [Vec3; 4] {
     [
         [-half, y, half],
@@ -14,8 +14,8 @@ pub const fn lying(half: i32, y: i32) -> [Vec3; 4] {
     ]
 }
 
-/// The corners of faces that show the whole texture, four vertices a face, clockwise from the texture's top
-/// left.
+/// Returns the corners of faces that show the whole texture, four vertices a face, clockwise from the
+/// texture's top left.
 pub const fn corners<const N: usize>() -> [Corner; N] {
     let side = (SIDE as i32) << 16;
     let places = [(0, 0), (side, 0), (side, side), (0, side)];
@@ -36,7 +36,7 @@ pub const fn corners<const N: usize>() -> [Corner; N] {
     corners
 }
 
-/// A face of four corners.
+/// Returns a face of four corners.
 pub const fn face(first: u16, normal: Vec3) -> MeshFace {
     MeshFace {
         first,

@@ -10,7 +10,7 @@ use crate::font::covers;
 use crate::noise::{ONE, fractal, hash};
 use crate::trig::{cos, sin};
 
-/// Texels across, and down.
+/// Texels across the texture, and down.
 pub const SIDE: usize = 256;
 
 /// Paints a texture texel by texel: `texel` returns the colour of column i and row j.
@@ -23,7 +23,7 @@ pub fn paint(texels: &mut [u8; MAX_TEXELS], texel: fn(i64, i64) -> u8) -> Textur
     Texture::new(texels, SIDE as u16, SIDE as u16).expect("there are SIDE x SIDE texels")
 }
 
-/// A shade of a ramp, limited so that the highlight has room.
+/// Returns a shade of a ramp, limited so that the highlight has room.
 pub fn shade(ramp: Ramp, shade: i64) -> u8 {
     ramp.shade(shade.clamp(1, 22) as usize)
 }
@@ -33,7 +33,7 @@ pub fn part(value: i64, steps: i64) -> i64 {
     (value * steps) >> 16
 }
 
-/// The direction of a point about the centre, as a fraction of a turn: 0 is up, clockwise.
+/// Returns the direction of a point about the centre, as a fraction of a turn: 0 is up, clockwise.
 fn direction(dx: i64, dy: i64) -> u32 {
     // Rotates the point into the quarter from up to right.
     let (quarter, x, y) = match (dx >= 0, dy < 0) {
@@ -52,8 +52,8 @@ fn direction(dx: i64, dy: i64) -> u32 {
     (angle.min((1 << 30) - 1)) + quarter * (1 << 30)
 }
 
-/// The distance of an angle from the nearest of `n` evenly spaced directions, and on which side it lies: 0 to
-/// 2^31, which is half the way to the next direction.
+/// Returns the distance of an angle from the nearest of `n` evenly spaced directions, and on which side it
+/// lies: 0 to 2^31, which is half the way to the next direction.
 fn from_ray(angle: u32, n: u32) -> (i64, bool) {
     let folded = angle.wrapping_mul(n);
     (
@@ -62,7 +62,7 @@ fn from_ray(angle: u32, n: u32) -> (i64, bool) {
     )
 }
 
-/// A compass dial in gold, silver and enamel.
+/// Returns the colour of a texel of a compass dial in gold, silver and enamel.
 pub fn dial(i: i64, j: i64) -> u8 {
     // From the centre, in half texels: odd numbers.
     let (dx, dy) = (2 * i - 255, 2 * j - 255);
@@ -152,7 +152,7 @@ pub fn dial(i: i64, j: i64) -> u8 {
     }
 }
 
-/// As `in_point` in [`dial`] for a star of four points, turned by an eighth of a turn.
+/// Returns what `in_point` in [`dial`] does for a star of four points that is turned by an eighth of a turn.
 fn in_point_turned(angle: u32, radius: i64, tip: i64, valley: i64) -> bool {
     let (from_axis, _) = from_ray(angle.wrapping_add(1 << 29), 4);
     radius * (valley + (((tip - valley) * from_axis) >> 31)) < tip * valley
@@ -166,7 +166,7 @@ fn side_turned(angle: u32, dark: i64, light: i64) -> i64 {
 /// Tiles of the board in a row.
 const TILES: i64 = 8;
 
-/// A board of eight by eight marble tiles, each labelled with its place.
+/// Returns the colour of a texel of a board of eight by eight marble tiles, each labelled with its place.
 pub fn board(i: i64, j: i64) -> u8 {
     let side = SIDE as i64 / TILES;
     let (column, row) = (i / side, j / side);
@@ -210,8 +210,8 @@ pub fn board(i: i64, j: i64) -> u8 {
     }
 }
 
-/// A plain of small tiles with detail at every distance: near the eye a texel is a tile, far away a whole
-/// field is.
+/// Returns the colour of a texel of a plain of small tiles with detail at every distance: near the eye a
+/// texel shows a tile, far away a whole field.
 pub fn plain(i: i64, j: i64) -> u8 {
     let (field_x, field_y) = (i / 16, j / 16);
     let (x, y) = (i % 16, j % 16);
@@ -239,7 +239,7 @@ pub fn plain(i: i64, j: i64) -> u8 {
     shade(ramp, 8 + checker + own)
 }
 
-/// Bricks, with a lit window in the middle.
+/// Returns the colour of a texel of a brick wall with a lit window in the middle.
 pub fn bricks(i: i64, j: i64) -> u8 {
     // The window: a rectangle with a round top.
     let (dx, dy) = (2 * i - 255, 2 * j - 200);
@@ -300,7 +300,7 @@ pub fn bricks(i: i64, j: i64) -> u8 {
         return shade(Indigo, 4 + part(grain, 4));
     }
     let own = hash([course, brick, 0], 13);
-    // Lit from the upper left: two bright sides and two dark ones.
+    // Lit from the upper left: two bright sides and two dark sides.
     let bevel = i64::from(x == 2 || y == 2) * 2 - i64::from(x == width - 1 || y == 15) * 2;
     let body = part(own, 4) + part(grain, 5) + bevel;
     match (ramp, own % 5) {
@@ -310,7 +310,8 @@ pub fn bricks(i: i64, j: i64) -> u8 {
     }
 }
 
-/// The side of a crate: boards, iron at the corners, and a crystal ball as an emblem.
+/// Returns the colour of a texel of the side of a crate: boards, iron at the corners, and a crystal ball as
+/// an emblem.
 pub fn crate_side(i: i64, j: i64) -> u8 {
     let (dx, dy) = (2 * i - 255, 2 * j - 255);
     let edge = 255 - dx.abs().max(dy.abs());
@@ -355,7 +356,7 @@ pub fn crate_side(i: i64, j: i64) -> u8 {
     }
 }
 
-/// Wood with its grain along a board.
+/// Returns the colour of a texel of wood with its grain along a board.
 fn wood(along: i64, across: i64, board: i64, base: i64) -> u8 {
     let place = [along * 1500, across * 9000, board * 77_777];
     let rings = part(fractal(place, 3, 90), 6);
@@ -366,7 +367,7 @@ fn wood(along: i64, across: i64, board: i64, base: i64) -> u8 {
     )
 }
 
-/// A crystal ball with a night sky in it.
+/// Returns the colour of a texel of a crystal ball with a night sky in it.
 fn emblem(dx: i64, dy: i64, radius: i64) -> u8 {
     let ball = (dx * dx + (dy + 10).pow(2)).isqrt();
     if ball < 68 {

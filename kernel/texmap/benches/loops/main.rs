@@ -10,7 +10,7 @@ use modex::PlanarBuffer;
 use texmap::{Loop, Mapper, Rows};
 use work::{By, Order, PIECES, PIXELS, draw, texels, texture};
 
-/// All that is timed.
+/// Returns everything that is timed.
 fn all() -> Vec<(By, Order)> {
     let mut all = Vec::new();
     for order in [Order::X, Order::Planes] {
@@ -23,7 +23,7 @@ fn all() -> Vec<(By, Order)> {
     all
 }
 
-/// As the mappers are called.
+/// Returns the label of a line: the name of a mapper where one draws the frame.
 fn name(by: By) -> String {
     match by {
         By::Bare => "bare load and store".into(),
@@ -35,7 +35,7 @@ fn name(by: By) -> String {
 }
 
 fn main() {
-    // Without the flag that `cargo bench` gives, this is a build and no measurement.
+    // Only `cargo bench` passes this flag; `cargo test` just builds and starts the program.
     if std::env::args().all(|arg| arg != "--bench") {
         return;
     }
@@ -50,18 +50,18 @@ mod cycles {
     use super::*;
     use std::arch::x86_64::{_mm_lfence, _rdtsc};
 
-    /// Many and short: other programs spoil few of them.
+    /// The rounds are many and short, so that other programs disturb few of them.
     const ROUNDS: usize = 401;
 
-    /// The time stamp, all before it done.
+    /// Returns the time stamp after all earlier instructions are done.
     fn now() -> u64 {
         // SAFETY: every x86-64 CPU has SSE2.
         unsafe { _mm_lfence() };
-        // SAFETY: as has it the counter; a system that forbids it would fault.
+        // SAFETY: every x86-64 CPU has the counter; a system that forbids reading it would fault.
         unsafe { _rdtsc() }
     }
 
-    /// Medians of cycles a pixel, with the spread of the middle half.
+    /// Prints the medians of cycles per pixel, with the fastest round and the spread of the middle half.
     pub fn table() {
         let texels = texels();
         let texture = texture(&texels);
@@ -73,8 +73,8 @@ mod cycles {
                 draw(&mut page, &texture, by, order);
                 let start = now();
                 draw(&mut page, &texture, by, order);
-                let taken = now() - start;
-                cycles.push(taken as f64 / f64::from(PIXELS));
+                let elapsed = now() - start;
+                cycles.push(elapsed as f64 / f64::from(PIXELS));
             }
         }
         for cycles in &mut cycles {
@@ -87,7 +87,7 @@ mod cycles {
         let median = |by, order| place(ROUNDS / 2, by, order);
         let packed = median(By::Loop(Loop::Packed), Order::X);
         println!(
-            "\ncycles a pixel, median of {ROUNDS} (middle half); of the bare loop's in the same order; packed in x order is so many times slower"
+            "\ncycles per pixel: median of {ROUNDS} rounds, fastest round, (middle half); ratio to the bare loop in the same order; packed in x order as a multiple of the median"
         );
         for (&(by, order), cycles) in all.iter().zip(&cycles) {
             let (fastest, low, middle, high) = (
@@ -108,14 +108,14 @@ mod cycles {
                 },
             );
         }
-        // What `texmap::mappers::adaptive` counts with.
+        // The costs `PIECE` and `EXACT` of `texmap::mappers::adaptive`.
         for order in [Order::X, Order::Planes] {
             let [short, long] = [PIECES[0], PIECES[PIECES.len() - 1]];
             let more = median(By::Pieces(short), order) - median(By::Pieces(long), order);
             let piece = more / (1.0 / f64::from(short) - 1.0 / f64::from(long));
             let pixel = median(By::Loop(Loop::fastest()), order);
             println!(
-                "{order:?}: a piece takes {piece:.0} cycles, as many as {:.0} pixels of {}; a quotient \
+                "{order:?}: a piece costs {piece:.0} cycles, as many as {:.0} pixels of {}; a quotient \
                  {:.1} pixels",
                 piece / pixel,
                 name(By::Loop(Loop::fastest())),

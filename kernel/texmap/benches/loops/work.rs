@@ -1,5 +1,5 @@
-//! What is measured: columns of a texture at an angle, drawn into a page in RAM in two orders, and
-//! the loop that can't be beaten.
+//! The measured work: columns of a texture at an angle, drawn into a page in RAM in two orders, and the bare
+//! loop, which no loop can beat.
 
 use modex::{Column, Destination, PlanarBuffer};
 use texmap::{
@@ -8,7 +8,7 @@ use texmap::{
 
 /// Columns of the frame.
 pub const COLUMNS: u16 = 320;
-/// Pixels in each.
+/// Pixels in each column.
 pub const LEN: u16 = 200;
 /// Pixels of the frame.
 pub const PIXELS: u32 = COLUMNS as u32 * LEN as u32;
@@ -16,23 +16,22 @@ pub const PIXELS: u32 = COLUMNS as u32 * LEN as u32;
 /// Texels across and down the texture.
 const SIDE: u16 = 128;
 
-/// Its texels.
+/// Returns the texture's texels.
 pub fn texels() -> Vec<u8> {
     (0..u32::from(SIDE).pow(2))
         .map(|i| (i.wrapping_mul(0x9E37_79B1) >> 24) as u8)
         .collect()
 }
 
-/// The texture.
+/// Returns the texture.
 pub fn texture(texels: &[u8]) -> Texture<'_> {
     Texture::padded(texels, SIDE, SIDE).expect("SIDE x SIDE texels")
 }
 
-/// Steps of 0.20 and 0.27 texel a pixel: the frame lies aslant in the texture and almost fills
-/// it.
+/// Steps of 0.20 and 0.27 texel a pixel: the frame lies aslant in the texture and almost fills it.
 const STEPS: (i32, i32) = (13_235, 17_695);
 
-/// The walk down column `x`.
+/// Returns the stepper down column `x`.
 pub fn down(x: u16) -> AffineStepper {
     let (x, (du, dv)) = (i32::from(x), STEPS);
     AffineStepper {
@@ -43,7 +42,7 @@ pub fn down(x: u16) -> AffineStepper {
     }
 }
 
-/// The walk along row `y` of the same frame.
+/// Returns the stepper along row `y` of the same frame.
 pub fn along(y: u16) -> AffineStepper {
     let (first, y, (du, dv)) = (down(0), i32::from(y), STEPS);
     AffineStepper {
@@ -54,7 +53,7 @@ pub fn along(y: u16) -> AffineStepper {
     }
 }
 
-/// In which order the columns come.
+/// The order in which the columns are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
     /// From left to right.
@@ -64,7 +63,7 @@ pub enum Order {
 }
 
 impl Order {
-    /// The columns in this order.
+    /// Returns the columns in this order.
     fn columns(self) -> impl Iterator<Item = u16> {
         let (planes, columns, step) = match self {
             Self::X => (1, COLUMNS, 1),
@@ -74,18 +73,18 @@ impl Order {
     }
 }
 
-/// What draws the frame.
+/// The way to draw the frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum By {
     /// Loads a texel and stores it, and steps nothing.
     Bare,
     /// A loop for columns.
     Loop(Loop),
-    /// Adaptive columns whose pieces are all as long: one of [`PIECES`].
+    /// Adaptive columns whose pieces all have this length, one of [`PIECES`].
     Pieces(u16),
     /// A quotient for every pixel of a column.
     Quotients,
-    /// A mapper of rows; it has an order of its own.
+    /// A mapper of rows, to which [`Order`] does not apply.
     Rows(Rows),
 }
 
@@ -105,10 +104,10 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
         By::Pieces(length) => {
             let tolerance = tolerance(length);
             columns(page, texture, order, |x| {
-                SpanKind::Adaptive(leaning(x, 1, 13), tolerance)
+                SpanKind::Adaptive(receding(x, 1, 13), tolerance)
             });
         }
-        By::Quotients => columns(page, texture, order, |x| SpanKind::Exact(leaning(x, 8, 8))),
+        By::Quotients => columns(page, texture, order, |x| SpanKind::Exact(receding(x, 8, 8))),
         By::Rows(rows) => {
             let style = Style {
                 rows,
@@ -132,11 +131,11 @@ pub fn draw(page: &mut PlanarBuffer, texture: &Texture<'_>, by: By, order: Order
 /// Lengths of pieces that are timed.
 pub const PIECES: [u16; 4] = [8, 16, 32, 64];
 
-/// The forms down column `x`: depth falls by a part in 2^`lean` of its first value with every
-/// pixel, and the texture begins to pass at a part of the frame's steps.
-fn leaning(x: u16, part: i64, lean: u32) -> PlaneStepper {
+/// Returns the forms down column `x`. With every pixel, c falls by a part in 2^`shift` of its first value.
+/// The texture coordinates begin with steps of 1 / `part` of the frame's.
+fn receding(x: u16, part: i64, shift: u32) -> PlaneStepper {
     let depth = 1 << 44;
-    let fall = -(depth >> lean);
+    let fall = -(depth >> shift);
     let AffineStepper { u, v, du, dv } = down(x);
     let form = |at: i32, step: i32| {
         let (at, step) = (i64::from(at), i64::from(step) / part);
@@ -151,7 +150,8 @@ fn leaning(x: u16, part: i64, lean: u32) -> PlaneStepper {
     }
 }
 
-/// What pieces of a length keep to and longer ones do not, down all of such a column.
+/// Returns a tolerance to which pieces of `length` pixels keep, and longer pieces do not, everywhere in such
+/// a column.
 fn tolerance(length: u16) -> Tolerance {
     let length = u32::from(length);
     // The closed form, where the column begins; c falls by a fortieth, and the next length is 4/3.
@@ -184,10 +184,10 @@ fn columns(
     }
 }
 
-/// A load and a store for every pixel, 16 times unrolled: the floor.
+/// Loads and stores once for every pixel, 16 times unrolled: no loop can be faster.
 ///
 /// # Panics
-/// If there are not 16 texels.
+/// If `texels` does not have 16 texels.
 pub fn bare(texels: &[u8], mut column: Column<'_>) {
     let texels = &texels[..16];
     let len = column.len();
@@ -203,8 +203,8 @@ pub fn bare(texels: &[u8], mut column: Column<'_>) {
                 )*)
             };
         }
-        // SAFETY: the loads are inside the 16 texels; the stores are the column's pixels, as
-        // `Lane::new` was promised. The stack is not used.
+        // SAFETY: the loads are inside the 16 texels; the stores are the column's pixels, as `Lane::new` was
+        // promised. The stack is not used.
         unsafe {
             asm!(
                 "jmp 3f",

@@ -11,9 +11,8 @@ use crate::mappers::pieces::Cuts;
 use crate::mappers::{MappedSpan, Mapper, SpanKind, exact, quadratic};
 use crate::plane::{Face, PlaneStepper, Tolerance};
 
-/// Under [`Rows::Lines`], affine rows of fewer pixels are stepped instead: a line is first made in
-/// RAM, and that costs as much as selecting a plane about eight times. Most spans in the free
-/// direction are this short.
+/// Under [`Rows::Lines`], affine rows of fewer pixels are stepped instead. A line is first made in RAM, which
+/// costs as much as selecting a plane about eight times. Most spans in a free direction are this short.
 const SHORT_ROW: u16 = 8;
 
 impl Style {
@@ -70,8 +69,8 @@ impl Job {
         }
     }
 
-    /// Passes each pixel with its texture coordinates, 16.16, to `sink`: the reference
-    /// implementation of [`Job::draw`]. Coordinates of the exact mapper are rounded down.
+    /// Passes each pixel with its texture coordinates, 16.16, to `sink`: the reference implementation of
+    /// [`Job::draw`]. Coordinates of the exact mapper are rounded down.
     pub fn pixels(&self, texture: &Texture<'_>, mut sink: impl FnMut((u16, u16), (i32, i32))) {
         let mut pixels = |job: &Self| {
             let mut coordinates = Coordinates::new(job.kind, job.len, texture);
@@ -200,8 +199,7 @@ impl Job {
         }
     }
 
-    /// Returns the plane of a span that stays in its column. Any other span may have pixels in
-    /// every plane.
+    /// Returns the plane of a span that stays in its column. Any other span may have pixels in every plane.
     #[inline]
     pub(crate) fn plane(&self) -> Option<u16> {
         match (self.axis, &self.kind) {
@@ -210,8 +208,7 @@ impl Job {
         }
     }
 
-    /// Draws the span's pixels that lie in `plane`, which must be selected. A column must lie in
-    /// `plane`.
+    /// Draws the span's pixels that lie in `plane`, which must be selected. A column must lie in `plane`.
     #[inline(always)]
     pub(crate) fn draw_in_plane_with(
         &self,
@@ -246,8 +243,7 @@ impl Job {
         }
     }
 
-    /// Passes the span in the free direction to `sink` as affine spans, each within one row or
-    /// column.
+    /// Passes the span in the free direction to `sink` as affine spans, each within one row or column.
     fn each_line(&self, stepper: &LineStepper, mut sink: impl FnMut(Self)) {
         let mut first = 0;
         while first < self.len {

@@ -93,13 +93,13 @@ impl<const N: usize> JobList<N> {
         &self.jobs[..self.len]
     }
 
-    /// Returns the jobs by planes.
+    /// Returns the jobs plane by plane.
     pub(crate) fn by_plane(&mut self) -> ByPlane<'_> {
         const { assert!(N <= ByPlane::END as usize, "a chain's links are 16 bits") };
         let (jobs, next) = (&self.jobs[..self.len], &mut self.next[..self.len]);
         let mut first = [ByPlane::END; 4];
-        // From the last job to the first, so that each job is put in front of its chains. A job's
-        // links in chains that it does not belong to are never read.
+        // Go from the last job to the first, so that each job goes to the front of its chains. A job's links
+        // in chains that it does not belong to are never read.
         for (i, (job, next)) in jobs.iter().zip(next.iter_mut()).enumerate().rev() {
             *next = first;
             match job.plane() {
@@ -131,7 +131,7 @@ mod tests {
 
     use super::*;
 
-    /// Later jobs overwrite earlier ones, so a chain must keep their order and lose no job.
+    /// Later jobs overwrite earlier jobs, so a chain must keep their order and lose no job.
     #[test]
     fn every_plane_has_its_jobs_in_the_order_in_which_they_came() {
         let mut random = seeded::generator();

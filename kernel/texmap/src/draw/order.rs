@@ -16,9 +16,9 @@ pub enum Order {
     Polygons,
     /// All of plane 0, then planes 1, 2 and 3; selects a plane four times per list.
     Planes,
-    /// Plane by plane into a page in RAM, which is then presented in wide stores. If any span of a
-    /// list leaves its column, the list is drawn polygon by polygon. The caller has to supply the
-    /// page as the destination.
+    /// Plane by plane into a page in RAM, which is then presented in wide stores. If any span of a list
+    /// leaves its column, the list is drawn polygon by polygon. The caller has to supply the page as the
+    /// destination.
     Buffer,
 }
 

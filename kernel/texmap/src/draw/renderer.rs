@@ -21,8 +21,7 @@ pub struct Stats {
     pub pixels: u32,
     /// Polygons outside the legal range, which were not drawn.
     pub dropped: u32,
-    /// The number of times that the job list was full and had to be drawn before the frame was
-    /// complete.
+    /// The number of times that the job list was full and had to be drawn before the frame was complete.
     pub full: u32,
 }
 
@@ -67,8 +66,8 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
         self.count(mapped);
     }
 
-    /// Adds a face as [`Renderer::face`] does, but only its parts that are visible according to
-    /// `visible`, which knows the face by `number`.
+    /// Adds a face as [`Renderer::face`] does, but only its parts that are visible according to `visible`,
+    /// which knows the face by `number`.
     ///
     /// # Panics
     /// If the texture `textures[face.texture]` does not exist.
@@ -83,8 +82,7 @@ impl<'a, D: Destination, const N: usize> Renderer<'a, D, N> {
             true => self.mapper.jobs(face, texture, |job| {
                 visible.cut(number, &job, |part| self.add(part));
             }),
-            // A hidden face needs no jobs, but a face outside the legal range still has to be
-            // counted.
+            // A hidden face needs no jobs, but a face outside the legal range still has to be counted.
             false => check(face.polygon),
         };
         self.count(mapped);

@@ -2,8 +2,7 @@
 
 /// Units of a position per pixel: positions are whole multiples of 1/256 pixel.
 pub const SUBPIXELS: i32 = 256;
-/// Largest magnitude of a vertex's x or y: 32 767 pixels. Within it, every product of the scan fits
-/// 64 bits.
+/// Largest magnitude of a vertex's x or y: 32 767 pixels. Within it, every product of the scan fits 64 bits.
 pub const MAX_COORDINATE: i32 = 32_767 * SUBPIXELS;
 
 /// A place on the screen. Pixel (x, y) has its centre at (256 x + 128, 256 y + 128).

@@ -10,8 +10,7 @@ pub const MAX_SIDES: usize = 16;
 pub enum Dropped {
     /// More than [`MAX_SIDES`] vertices.
     TooManySides,
-    /// A vertex is further out than [`MAX_COORDINATE`], or its texture coordinates are outside the
-    /// texture.
+    /// A vertex is further out than [`MAX_COORDINATE`], or its texture coordinates are outside the texture.
     OutOfRange,
 }
 

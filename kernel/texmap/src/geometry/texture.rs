@@ -4,10 +4,10 @@ use core::fmt;
 
 /// A rectangle of texels, row by row. Texel (i, j) covers [i, i + 1) x [j, j + 1).
 ///
-/// The rows lie `pitch` texels apart. In a *padded* texture the pitch and the number of rows are
-/// powers of two, so an index made of masked coordinates cannot leave the texture. A *tiled*
-/// texture is a rectangle that repeats one tile, and only the tile's texels are stored. Every
-/// statement about coordinates in a texture refers to the rectangle; only the index wraps around.
+/// The rows lie `pitch` texels apart. In a *padded* texture the pitch and the number of rows are powers of
+/// two, so an index made of masked coordinates cannot leave the texture. A *tiled* texture is a rectangle
+/// that repeats one tile, and only the tile's texels are stored. Every statement about coordinates in a
+/// texture refers to the rectangle; only the index wraps around.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
     texels: &'a [u8],
@@ -17,7 +17,7 @@ pub struct Texture<'a> {
     is_padded: bool,
     /// See [`Texture::masks`].
     masks: u64,
-    /// Masks that keep the tile's bits of a column's number and of a row's.
+    /// Masks that keep the tile's bits of a column's number and of a row's number.
     wrap: (u16, u16),
 }
 
@@ -81,8 +81,8 @@ impl<'a> Texture<'a> {
         Self::with_rows(texels, width, height, width, height)
     }
 
-    /// Returns a padded texture of `width` x `height` texels. `texels` has [`Texture::padded_len`]
-    /// texels, in rows of the next power of two. Texels beyond `width` or `height` are never drawn.
+    /// Returns a padded texture of `width` x `height` texels. `texels` has [`Texture::padded_len`] texels, in
+    /// rows of the next power of two. Texels beyond `width` or `height` are never drawn.
     ///
     /// # Errors
     /// If a side is outside 1 to 256, or the slice has another length.
@@ -91,8 +91,8 @@ impl<'a> Texture<'a> {
         Self::with_rows(texels, width, height, pitch, rows)
     }
 
-    /// Returns a texture of `width` x `height` texels that repeats a tile of `tile.0` x `tile.1`
-    /// texels; `texels` has the tile's. The tile's sides must be powers of two.
+    /// Returns a texture of `width` x `height` texels that repeats a tile of `tile.0` x `tile.1` texels;
+    /// `texels` has the tile's. The tile's sides must be powers of two.
     ///
     /// # Errors
     /// If a side is outside 1 to 256, or the slice has another length.
@@ -159,19 +159,18 @@ impl<'a> Texture<'a> {
         self.pitch
     }
 
-    /// Returns the bits of a column's number and of a row's in a padded texture, or nothing for
-    /// other textures.
+    /// Returns the bits of a column's number and of a row's in a padded texture, or nothing for other
+    /// textures.
     pub fn bits(&self) -> Option<(u32, u32)> {
         let columns = self.pitch.trailing_zeros();
         self.is_padded
             .then(|| (columns, self.texels.len().trailing_zeros() - columns))
     }
 
-    /// Returns a mask of the coordinates' bits that make the index in a padded texture. The
-    /// column's bits are bits 16 and up of u. The row's bits continue them, 32 bits higher, in v
-    /// times the pitch.
+    /// Returns a mask of the coordinates' bits that make the index in a padded texture. The column's bits are
+    /// bits 16 and up of u. The row's bits continue them, 32 bits higher, in v times the pitch.
     ///
-    /// Needed for every column, and therefore computed with the texture.
+    /// Every column needs the mask, so it is computed once, with the texture.
     #[inline]
     pub(crate) fn masks(&self) -> Option<u64> {
         self.is_padded.then_some(self.masks)
@@ -206,8 +205,8 @@ impl<'a> Texture<'a> {
         (self.last.1 >> 16) as u16 + 1
     }
 
-    /// Returns the last coordinates inside the texture, 16.16. The last texel owns the far border,
-    /// so u = width reads texel width - 1.
+    /// Returns the last coordinates inside the texture, 16.16. The last texel owns the far border, so
+    /// u = width reads texel width - 1.
     #[inline]
     pub fn last(&self) -> (i32, i32) {
         self.last

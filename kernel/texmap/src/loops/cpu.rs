@@ -3,8 +3,8 @@
 use core::arch::x86_64::{__cpuid, __cpuid_count};
 use core::sync::atomic::{AtomicU8, Ordering};
 
-/// Returns whether the CPU has BMI2, and with it PEXT. Keeps the answer: CPUID is slow, above all
-/// under a hypervisor.
+/// Returns whether the CPU has BMI2, and with it PEXT. The first call stores the answer, because CPUID is
+/// slow, above all under a hypervisor.
 #[inline]
 pub(super) fn has_extract() -> bool {
     const UNKNOWN: u8 = 0;

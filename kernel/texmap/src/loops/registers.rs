@@ -1,5 +1,5 @@
-//! The registers of the loops: their start values for a stepper, and their steps. These are the
-//! portable versions of the loops.
+//! The registers of the loops: their start values for a stepper, and their steps. These are the portable
+//! versions of the loops.
 //!
 //! Sums wrap: the step after the last pixel may lead anywhere.
 
@@ -10,21 +10,19 @@ use crate::geometry::Texture;
 
 /// The values that a loop keeps in registers.
 pub(super) trait Registers: Sized {
-    /// Returns the values at the first of `len` pixels, at least one, or nothing if the loop does
-    /// not support the texture.
+    /// Returns the values at the first of `len` pixels, at least one, or nothing if the loop does not support
+    /// the texture.
     ///
     /// # Panics
     /// If the span leaves the texture, unless the loop wraps it around.
     fn new(texture: &Texture<'_>, stepper: AffineStepper, len: u16) -> Option<Self>;
 
-    /// Returns the index of the current pixel's texel, which the texture has, and steps to the next
-    /// pixel.
+    /// Returns the index of the current pixel's texel, which the texture has, and steps to the next pixel.
     fn next(&mut self) -> usize;
 }
 
-/// Returns the registers at the first pixel of a column, if the loop has to draw it. An empty
-/// column needs no drawing. If the loop does not support the texture, the reference implementation
-/// draws the column here.
+/// Returns the registers at the first pixel of a column, if the loop has to draw it. An empty column needs no
+/// drawing. If the loop does not support the texture, the reference implementation draws the column here.
 #[inline(always)]
 pub(super) fn start<'c, R: Registers>(
     texture: &Texture<'_>,
@@ -43,8 +41,8 @@ pub(super) fn start<'c, R: Registers>(
     }
 }
 
-/// A separate function that gets the stepper by value: otherwise the stepper would be stored to
-/// memory before the registers are made.
+/// Draws a column of a texture that the loop does not support. A separate function that gets the stepper by
+/// value: otherwise the stepper would be stored to memory before the registers are made.
 #[inline(never)]
 fn unpadded(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     stepper::column(texture, stepper, column);
@@ -75,8 +73,8 @@ struct CheckedStepper {
 }
 
 impl CheckedStepper {
-    /// Returns `stepper` over `len` pixels, at least one. Returns nothing in a tiled texture, where
-    /// the index does not advance as the coordinates do.
+    /// Returns `stepper` over `len` pixels, at least one. Returns nothing in a tiled texture, where the index
+    /// does not advance as the coordinates do.
     ///
     /// # Panics
     /// If the span leaves the texture.
@@ -106,9 +104,8 @@ impl CheckedStepper {
         row * usize::from(self.pitch) + column
     }
 
-    /// Returns what every step adds to the index, apart from the carries. The whole parts are
-    /// rounded down, so the fractions are positive even for a negative step, and every carry adds
-    /// one.
+    /// Returns what every step adds to the index, apart from the carries. The whole parts are rounded down,
+    /// so the fractions are positive even for a negative step, and every carry adds one.
     #[inline]
     fn whole_step(&self) -> isize {
         let AffineStepper { du, dv, .. } = self.stepper;
@@ -160,8 +157,8 @@ impl Registers for Address {
     }
 }
 
-/// The texel's index, and both fractions in one register: 16 bits of u at the top, 15 bits of v at
-/// the bottom, and between them a bit that receives the carry of v and is cleared at every step.
+/// The texel's index, and both fractions in one register: 16 bits of u at the top, 15 bits of v at the
+/// bottom, and between them a bit that receives the carry of v and is cleared at every step.
 pub(super) struct Halves {
     pub at: usize,
     pub fractions: u32,
@@ -211,9 +208,8 @@ impl Registers for Halves {
     }
 }
 
-/// The coordinates, with the bits of the index at bit 16 and above: `u_mask` selects the column's
-/// bits and `v_mask` the row's. Padded textures: the two masks together address exactly the
-/// texture's texels.
+/// The coordinates, with the bits of the index at bit 16 and above: `u_mask` selects the column's bits and
+/// `v_mask` the row's. Padded textures: the two masks together address exactly the texture's texels.
 pub(super) struct Pair {
     pub u: u32,
     pub v: u32,
@@ -228,8 +224,7 @@ impl Registers for Pair {
     fn new(texture: &Texture<'_>, stepper: AffineStepper, _: u16) -> Option<Self> {
         let masks = texture.masks()?;
         let pitch = u32::from(texture.pitch());
-        // Rows and columns have at most 8 bits each, so v keeps the 16 bits of its fraction and the
-        // 8 above.
+        // Rows and columns have at most 8 bits each, so v keeps the 16 bits of its fraction and the 8 above.
         Some(Self {
             u: stepper.u as u32,
             v: (stepper.v as u32).wrapping_mul(pitch),
@@ -248,14 +243,14 @@ impl Registers for Pair {
     }
 }
 
-/// Both coordinates in one register, and a mask of the index's bits in it. Padded textures: the
-/// mask addresses exactly the texture's texels.
+/// Both coordinates in one register, and a mask of the index's bits in it. Padded textures: the mask
+/// addresses exactly the texture's texels.
 ///
-/// u lies at the bottom, with only the bits that are inside the padded texture: 16 of fraction and
-/// at most 8 above. A negative step is replaced by the positive step that leads to the same column
-/// around the texture, so nothing is ever borrowed. Carries of u beyond its bits go into the 16
-/// free bits above, which a column of 65 535 pixels does not fill. v lies above the free bits, and
-/// its carries leave the register or are masked out.
+/// u lies at the bottom, with only the bits that are inside the padded texture: 16 of fraction and at most 8
+/// above. A negative step is replaced by the positive step that leads to the same column around the texture,
+/// so nothing is ever borrowed. Carries of u beyond its bits go into the 16 free bits above, which a column
+/// of 65 535 pixels does not fill. v lies above the free bits, and its carries leave the register or are
+/// masked out.
 pub(super) struct Joint {
     pub at: u64,
     pub step: u64,
@@ -284,18 +279,17 @@ impl Registers for Joint {
     }
 }
 
-/// Two registers, each with the other coordinate's fraction: (fraction of u, row) and (fraction of
-/// v, column), 32 bits each. The carry out of one register is what the other's whole texels lack.
+/// Two registers, each with the other coordinate's fraction: (fraction of u, row) and (fraction of v,
+/// column), 32 bits each. The carry out of one register is what the other's whole texels lack.
 ///
-/// A step has two sums, and the carry of the second comes too late for the first: it waits for the
-/// next step. So v's fraction starts one step ahead, and the carry of that first step is kept.
+/// A step has two sums, and the carry of the second comes too late for the first: it waits for the next step.
+/// So v's fraction starts one step ahead, and the carry of that first step is kept.
 ///
-/// A step's whole texels may be negative, and are added together with the fraction as a single
-/// number. In a span inside its texture the whole texels of the sum are not negative, so the
-/// fraction gets back exactly what it lent. But the *carry* is right only while the step as a
-/// number is not negative, which it would be with negative whole texels and a fraction of zero.
-/// Therefore each step's fraction is too large by one part in 2^32. That does not reach the
-/// fraction's 16 bits within 65 535 pixels.
+/// A step's whole texels may be negative, and are added together with the fraction as a single number. In a
+/// span inside its texture the whole texels of the sum are not negative, so the fraction gets back exactly
+/// the units that it lent. But the *carry* is right only while the step as a number is not negative, which it
+/// would be with negative whole texels and a fraction of zero. Therefore each step's fraction is too large by
+/// one part in 2^32. That does not reach the fraction's 16 bits within 65 535 pixels.
 pub(super) struct Crossed {
     /// Bits of a column's number.
     pub columns: u32,

@@ -1,15 +1,14 @@
 //! The affine column loops: several ways to make the same steps.
 //!
-//! Each loop draws steps inside the texture with exactly the texels of its reference
-//! implementation, [`column`](super::stepper::column). A loop with fewer bits than the stepper
-//! draws the texels that the reference implementation draws for [`Loop::effective`]. On x86-64 a
-//! loop is written in assembly. On other CPUs, and in [`Loop::portable`] everywhere, plain Rust
-//! steps the same registers.
+//! Each loop draws steps inside the texture with exactly the texels of its reference implementation,
+//! [`column`](super::stepper::column). A loop with fewer bits than the stepper draws the texels that the
+//! reference implementation draws for [`Loop::effective`]. On x86-64 a loop is written in assembly. On other
+//! CPUs, and in [`Loop::portable`] everywhere, plain Rust steps the same registers.
 //!
 //! # Why no loop checks what it reads
 //!
-//! A bounds check at every pixel would cost more than the step. Two arguments replace it. Both hold
-//! for any input, so drawing a column stays safe:
+//! A bounds check at every pixel would cost more than the step. Two arguments replace it. Both hold for any
+//! input, so drawing a column stays safe:
 //!
 //! - *Checked at both ends.* [`Loop::TwoCarries`], [`Loop::Packed`], [`Loop::StepTable`] and
 //!   [`Loop::AddCarry`] keep an address or whole texels. The coordinates of the first and the last
@@ -24,10 +23,9 @@
 //!
 //! # Wrap-around
 //!
-//! A masked loop reads column `(u >> 16) mod pitch` and row `(v >> 16) mod rows`, where pitch and
-//! rows are those of the *padded* texture, and u and v wrap at 2^32. So a texture whose sides are
-//! not powers of two shows its padding. A negative step works, because no bits of one coordinate
-//! can run into the other.
+//! A masked loop reads column `(u >> 16) mod pitch` and row `(v >> 16) mod rows`, where pitch and rows are
+//! those of the *padded* texture, and u and v wrap at 2^32. So a texture whose sides are not powers of two
+//! shows its padding. A negative step works, because no bits of one coordinate can run into the other.
 
 use modex::Column;
 
@@ -48,28 +46,27 @@ pub(crate) type Draw = fn(&Texture<'_>, &AffineStepper, Column<'_>);
 pub enum Loop {
     /// Computes the texel's index from scratch for every pixel: the reference implementation.
     Multiply,
-    /// An address and two fractions, with a test of each carry (chapter 58's first column loop). 7
-    /// to 9 instructions; 2 of them are branches that texture and step make hard to predict.
+    /// An address and two fractions, with a test of each carry (chapter 58's first column loop). 7 to 9
+    /// instructions; 2 of them are branches that texture and step make hard to predict.
     TwoCarries,
-    /// Both fractions in one register, one branch (chapter 58's last loop). 6 to 8 instructions,
-    /// and a fraction of 15 bits down the texture: see [`Loop::effective`].
+    /// Both fractions in one register, one branch (chapter 58's last loop). 6 to 8 instructions, and a
+    /// fraction of 15 bits down the texture: see [`Loop::effective`].
     Packed,
-    /// The carry selects one of two steps, without a branch (chapter 58's guess of John Miles's
-    /// method). 6 instructions.
+    /// The carry selects one of two steps, without a branch (chapter 58's guess of John Miles's method). 6
+    /// instructions.
     StepTable,
-    /// Two accumulators, shifts and masks; padded textures. 10 instructions, none of which needs a
-    /// flag.
+    /// Two accumulators, shifts and masks; padded textures. 10 instructions, which need no CPU flag.
     #[default]
     Shifts,
     /// One accumulator for both coordinates, shifts and masks; padded textures. 9 instructions.
     OneAccumulator,
-    /// Each register holds one coordinate's texels and the other's fraction, stepped by
-    /// add-with-carry; padded textures (Barrett's loop without wrap-around). 6 instructions for a
-    /// pitch of 256 texels, or of at most 8; 7 or 8 instructions between.
+    /// Each register holds one coordinate's texels and the other's fraction, stepped by add-with-carry;
+    /// padded textures (Barrett's loop without wrap-around). 6 instructions for a pitch of 256 texels, or of
+    /// at most 8; 7 or 8 instructions between.
     AddCarry,
-    /// One accumulator, with the CPU's bit-extract for the index; padded textures, a CPU with BMI2.
-    /// 4 instructions. (AMD's CPUs before Zen 3 have BMI2 but split the extract into many
-    /// operations: it is slow there.)
+    /// One accumulator, with the CPU's bit-extract for the index; padded textures, a CPU with BMI2. 4
+    /// instructions. (AMD's CPUs before Zen 3 have BMI2 but split the extract into many operations: it is
+    /// slow there.)
     Extract,
 }
 
@@ -95,8 +92,8 @@ impl Loop {
         )
     }
 
-    /// Returns the fastest loop for padded textures on this CPU: bit-extract if the CPU has it,
-    /// otherwise the loop that is fastest under QEMU's TCG.
+    /// Returns the fastest loop for padded textures on this CPU: bit-extract if the CPU has it, otherwise the
+    /// loop that is fastest under QEMU's TCG.
     pub fn fastest() -> Self {
         match Self::Extract.is_tuned_here() {
             true => Self::Extract,
@@ -104,8 +101,8 @@ impl Loop {
         }
     }
 
-    /// Returns whether this CPU runs the loop's own instructions, rather than its portable version.
-    /// The texels are the same.
+    /// Returns whether this CPU runs the loop's own instructions, rather than its portable version. The
+    /// texels are the same.
     pub fn is_tuned_here(self) -> bool {
         match self {
             Self::Multiply => true,
@@ -115,14 +112,13 @@ impl Loop {
         }
     }
 
-    /// Returns the stepper that the loop actually uses for `stepper`: it reads at these
-    /// coordinates.
+    /// Returns the stepper that the loop actually uses for `stepper`: it reads at these coordinates.
     ///
-    /// Only [`Loop::Packed`] has fewer bits. It drops the last bit of v and of v's step. The step
-    /// is cut towards zero, so the span stays as far inside the texture as before. After i pixels v
-    /// is off by at most (i + 1) 2^-16 texel, so by n 2^-16 over a column of n pixels. That adds to
-    /// the stepper's own n 2^-16; together they are the drift of 15 bits, n 2^-15. It is less than
-    /// 0.0074 texel over 240 pixels, and passes 1/256 texel after 128.
+    /// Only [`Loop::Packed`] has fewer bits. It drops the last bit of v and of v's step. The step is cut
+    /// towards zero, so the span stays as far inside the texture as before. After i pixels v is off by at
+    /// most (i + 1) 2^-16 texel, so by n 2^-16 over a column of n pixels. That adds to the stepper's own
+    /// n 2^-16; together they are the drift of 15 bits, n 2^-15. It is less than 0.0074 texel over 240
+    /// pixels, and passes 1/256 texel after 128.
     pub fn effective(self, stepper: AffineStepper) -> AffineStepper {
         match self {
             Self::Packed => Halves::effective(stepper),
@@ -139,8 +135,7 @@ impl Loop {
         self.draw()(texture, &stepper, column);
     }
 
-    /// Draws a column with the loop's portable version: the same registers and the same bits, on
-    /// any CPU.
+    /// Draws a column with the loop's portable version: the same registers and the same bits, on any CPU.
     ///
     /// # Panics
     /// As [`Loop::column`].

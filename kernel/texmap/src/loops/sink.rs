@@ -1,5 +1,5 @@
-//! Pixel sinks: the pixels that receive a span's texels, one after the other. They lie down a
-//! column, at every fourth pixel of a row, or at every pixel of a row.
+//! Pixel sinks: the pixels that receive a span's texels, one after the other. They lie down a column, at
+//! every fourth pixel of a row, or at every pixel of a row.
 
 use modex::{Column, Lane, Line};
 
@@ -96,8 +96,7 @@ impl PixelSink for RowSink<'_, '_> {
     #[inline(always)]
     fn fill(self, mut texel: impl FnMut() -> u8) {
         let Self { line, first, end } = self;
-        // Write groups of four pixels with the same address, and the pixels before and after them
-        // one by one.
+        // Write groups of four pixels with the same address, and the pixels before and after them one by one.
         let (from, to) = (first.div_ceil(4), end / 4);
         for x in first..end.min(4 * from) {
             line[x & 3][x / 4] = texel();

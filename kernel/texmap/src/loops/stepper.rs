@@ -7,12 +7,12 @@ use crate::geometry::Texture;
 /// Fraction bits of a line's offset across its direction: 320 steps keep it within 2^-14 pixel.
 pub(crate) const LINE_FRACTION: u32 = 22;
 
-/// Constant steps through the texture along a span, 16.16: the coordinates at the first pixel, and
-/// their steps.
+/// Constant steps through the texture along a span, 16.16: the coordinates at the first pixel, and their
+/// steps.
 ///
-/// For every pixel i of its span, `u + i du` and `v + i dv` lie inside the texture: both end values
-/// were clamped into the texture and the steps are cut towards zero, so nothing between the ends
-/// can leave it. No loop clamps.
+/// For every pixel i of its span, `u + i du` and `v + i dv` lie inside the texture: both end values were
+/// clamped into the texture and the steps are cut towards zero, so nothing between the ends can leave it. No
+/// loop clamps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AffineStepper {
     /// Coordinate across the texture, at the first pixel's centre.
@@ -26,8 +26,7 @@ pub struct AffineStepper {
 }
 
 impl AffineStepper {
-    /// Returns the stepper that starts at pixel `pixels` of this stepper and steps by `stride`
-    /// pixels.
+    /// Returns the stepper that starts at pixel `pixels` of this stepper and steps by `stride` pixels.
     pub fn every(&self, stride: i32, pixels: i32) -> Self {
         let Self { u, v, du, dv } = *self;
         Self {
@@ -106,8 +105,7 @@ impl LineStepper {
         ((self.offset + self.slope * i32::from(i)) >> LINE_FRACTION) as i16
     }
 
-    /// Returns the stepper that starts at pixel `i`, with offsets relative to that pixel's row or
-    /// column.
+    /// Returns the stepper that starts at pixel `i`, with offsets relative to that pixel's row or column.
     pub(crate) fn after(&self, i: u16) -> Self {
         let offset = self.offset + self.slope * i32::from(i);
         Self {
@@ -133,8 +131,8 @@ impl Iterator for LineStepper {
     }
 }
 
-/// Draws one column and computes the texel's index from scratch for each pixel: the reference
-/// implementation of the loops.
+/// Draws one column and computes the texel's index from scratch for each pixel: the reference implementation
+/// of the loops.
 #[inline]
 pub fn column(texture: &Texture<'_>, mut stepper: AffineStepper, column: Column<'_>) {
     column.fill(|| {

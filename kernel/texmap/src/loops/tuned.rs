@@ -1,14 +1,13 @@
 //! The loops in x86-64 instructions. [`super::select`] explains why they may read without a check.
 //!
-//! All loops share a frame of code: blocks of [`BLOCK`] pixels, where each store has a constant
-//! offset (chapter 58). The frame enters the first block in the middle, so that the pixels left
-//! fill whole blocks. So one loop draws any height, a column of one pixel included, with a single
-//! jump that is hard to predict. Nothing between pixels changes the carry flag (LEA steps the
-//! address, DEC counts), so a loop may keep a carry in it. The fastest loops have a second frame,
-//! for pieces of columns whose pixels come in eights.
+//! All loops share a frame of code: blocks of [`BLOCK`] pixels, where each store has a constant offset
+//! (chapter 58). The frame enters the first block in the middle, so that the pixels left fill whole blocks.
+//! So one loop draws any height, a column of one pixel included, with a single jump that is hard to predict.
+//! Nothing between pixels changes the carry flag (LEA steps the address, DEC counts), so a loop may keep a
+//! carry in it. The fastest loops have a second frame, for pieces of columns whose pixels come in eights.
 //!
-//! Every function gets the first values of its registers in a type of [`super::registers`]. That
-//! type was made from a stepper that stays in the texture, or has masks that do.
+//! Every function gets the first values of its registers in a type of [`super::registers`]. That type was
+//! made from a stepper that stays in the texture, or has masks that do.
 
 #![allow(unsafe_code)]
 
@@ -27,9 +26,9 @@ use crate::geometry::Texture;
 const BLOCK: usize = 32;
 const _: () = assert!(STRIDE == 80, "the offsets in `down` are multiples of 80");
 
-/// The frame, for a column that is not empty. `$first` prepares the flags. `$pixel!(offset)` is one
-/// pixel and its step: it stores to `{dest}` + offset, may use `{texel}` and `{spare}` freely, and
-/// uses the operands that follow it.
+/// The frame of code, for a column that is not empty. `$first` prepares the flags. `$pixel!(offset)` is one
+/// pixel and its step: it stores to `{dest}` + offset, may use `{texel}` and `{spare}` freely, and uses the
+/// operands that follow it.
 macro_rules! down {
     ($column:ident, $first:literal, $pixel:ident, $($operands:tt)*) => {
         down!(
@@ -52,9 +51,9 @@ macro_rules! down {
         // The number of the first block's pixels to skip, as if the column began above its top.
         let left_out = len.wrapping_neg() % BLOCK;
         let dest = $column.as_ptr().wrapping_sub(left_out * STRIDE);
-        // SAFETY: the frame stores to the first byte of the column and to every 80th after it, as
-        // many bytes as the column has pixels: exactly what `Lane::new` was promised. `$pixel`
-        // reads texels only, by its caller's argument. The stack is not used.
+        // SAFETY: the code stores to the first byte of the column and to every 80th after it, as many bytes
+        // as the column has pixels: exactly what `Lane::new` was promised. `$pixel` reads texels only, by its
+        // caller's argument. The stack is not used.
         unsafe {
             asm!(
                 "lea {spare}, [rip + 8f]",
@@ -82,7 +81,7 @@ macro_rules! down {
     }};
 }
 
-/// The frame for the whole eights of a column. It has no entry in the middle, and does not draw the
+/// The frame of code for the whole eights of a column. It has no entry in the middle, and does not draw the
 /// pixels after the last whole eight.
 macro_rules! eights {
     ($column:ident, "", $pixel:ident, $($operands:tt)*) => {{
@@ -116,7 +115,7 @@ macro_rules! eights {
     }};
 }
 
-/// An address and two fractions, with a test of each carry.
+/// Draws a column with an address and two fractions, and tests each carry.
 #[inline(always)]
 pub(super) fn two_carries(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
@@ -155,8 +154,8 @@ pub(super) fn two_carries(texture: &Texture<'_>, stepper: AffineStepper, column:
     );
 }
 
-/// Both fractions in one register. The upper fraction's carry leaves the register and is added to
-/// the address; the lower's goes to a bit that is tested.
+/// Draws a column with both fractions in one register. The upper fraction's carry leaves the register and is
+/// added to the address; the lower fraction's carry goes to a bit that is tested.
 #[inline(always)]
 pub(super) fn packed(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
@@ -192,7 +191,8 @@ pub(super) fn packed(texture: &Texture<'_>, stepper: AffineStepper, column: Colu
     );
 }
 
-/// SBB turns v's carry into 0 or -1, which selects the step; u's carry is added along with it.
+/// Draws a column with a table of two steps. SBB turns v's carry into 0 or -1, which selects the step; u's
+/// carry is added along with it.
 #[inline(always)]
 pub(super) fn step_table(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
@@ -274,7 +274,7 @@ pub(crate) fn shifts_eights(texture: &Texture<'_>, stepper: AffineStepper, colum
     shifts!(eights, texture, stepper, column, spare = out(reg) _,);
 }
 
-/// One accumulator and one mask, with the row's bits shifted down to the column's.
+/// Draws a column with one accumulator and one mask; the row's bits are shifted down to the column's.
 #[inline(always)]
 pub(super) fn one_accumulator(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     macro_rules! pixel {
@@ -306,8 +306,8 @@ pub(super) fn one_accumulator(texture: &Texture<'_>, stepper: AffineStepper, col
     );
 }
 
-/// The two registers exchange their carries. Every shift changes the flags, so the row is scaled by
-/// the scale of an address or by moving a byte, depending on the pitch.
+/// Draws a column with two registers that exchange their carries. Every shift changes the flags, so the row
+/// is scaled by the scale of an address or by moving a byte, depending on the pitch.
 #[inline(always)]
 pub(super) fn add_carry(texture: &Texture<'_>, stepper: AffineStepper, column: Column<'_>) {
     let Some((start, mut column)) = start::<Crossed>(texture, stepper, column) else {
@@ -423,7 +423,7 @@ pub(crate) fn extract_eights(texture: &Texture<'_>, stepper: AffineStepper, colu
 /// Writes the texels of a row as `extract` does. The CPU must have BMI2.
 #[inline(always)]
 pub(super) fn fill_row(texels: &[u8], joint: Joint, sink: impl PixelSink) {
-    /// Compiled for a CPU with BMI2, together with the loop that fills `sink`.
+    /// Fills `sink`. This function and the loop inside `sink` are compiled for a CPU with BMI2.
     #[target_feature(enable = "bmi2")]
     fn extract(texels: &[u8], joint: Joint, sink: impl PixelSink) {
         let Joint { mut at, step, mask } = joint;

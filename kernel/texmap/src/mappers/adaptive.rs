@@ -1,28 +1,27 @@
 //! Adaptive subdivision: perspective by linear pieces, each as long as an error allows.
 //!
-//! Pieces are linear between the quotients at their ends, as in [`super::linear`], but the length
-//! of a piece depends on where it lies. The texture coordinate is most curved far away. So pieces
-//! are made from the span's near end on, and become shorter and shorter. Where even the shortest
-//! piece errs too much, the rest of the span is drawn exactly.
+//! Pieces are linear between the quotients at their ends, as in [`super::linear`], but the length of a piece
+//! depends on where it lies. The texture coordinate is most curved far away. So pieces are made from the
+//! span's near end on, and become shorter and shorter. Where the error of even the shortest piece is too
+//! large, the rest of the span is drawn exactly.
 //!
 //! # How long
 //!
-//! A piece of n pixels keeps to the tolerance where the geometric mean of the inverse depths at its
-//! ends is large enough ([`crate::plane::bounds`]). One multiplication decides that, before any
-//! quotient is computed. (The inverse depth is the value of the form c, which is large near the
-//! eye.) If the whole span keeps to the tolerance, it is one piece. Otherwise each piece has the
-//! longest of the [`LENGTHS`] that keeps to the tolerance there. No piece is longer than the piece
-//! before it, since c falls. The last piece at the far end may be shorter, and is judged as if it
-//! had its full length.
+//! A piece of n pixels keeps to the tolerance where the geometric mean of the inverse depths at its ends is
+//! large enough ([`crate::plane::bounds`]). One multiplication decides that, before any quotient is computed.
+//! (The inverse depth is the value of the form c, which is large near the eye.) If the whole span keeps to
+//! the tolerance, it is one piece. Otherwise each piece has the longest of the [`LENGTHS`] that keeps to the
+//! tolerance there. No piece is longer than the piece before it, since c falls. The last piece at the far end
+//! may be shorter, and is judged as if it had its full length.
 //!
-//! Error: at most the tolerance, which covers everything: the chords, their ends (rounded down, and
-//! clamped into the texture), and the steps, which are cut towards zero. Where a clamp alone
-//! exceeds the tolerance, a piece is a single pixel, which is its own end.
+//! Error: at most the tolerance, which covers everything: the chords, their ends (rounded down, and clamped
+//! into the texture), and the steps, which are cut towards zero. Where a clamp alone exceeds the tolerance, a
+//! piece is a single pixel, which is its own end.
 //!
 //! # Rows
 //!
-//! Lengths are multiples of four, and a row's first piece ends where a group of four pixels with a
-//! common address ends. So each of the following pieces has equally many pixels in all four planes.
+//! Lengths are multiples of four, and a row's first piece ends where a group of four pixels with a common
+//! address ends. So each of the following pieces has equally many pixels in all four planes.
 
 use super::exact;
 use super::pieces::between;
@@ -31,8 +30,8 @@ use crate::loops::{AffineLoops, AffineStepper, SpanPixels};
 use crate::plane::bounds::Chords;
 use crate::plane::{PlaneStepper, Reciprocal, Tolerance, quotients_and_excess};
 
-/// Lengths of pieces in pixels, the longest first. A piece of four would cost more than quotients:
-/// see [`PIECE`].
+/// Lengths of pieces in pixels, the longest first. A piece of four would cost more than quotients: see
+/// [`PIECE`].
 pub const LENGTHS: [u16; 11] = [256, 192, 128, 96, 64, 48, 32, 24, 16, 12, 8];
 /// Cost of making a piece, in pixels of an affine column.
 pub const PIECE: u32 = 26;
@@ -50,8 +49,7 @@ pub struct AffinePiece {
     pub stepper: AffineStepper,
 }
 
-/// Cuts a span into pieces, from its near end on. Then [`AdaptivePieces::rest`] returns what is
-/// left.
+/// Cuts a span into pieces, from its near end on. Then [`AdaptivePieces::rest`] returns what is left.
 #[derive(Clone, Copy, Debug)]
 pub struct AdaptivePieces {
     /// The forms from the start of the next piece on, away from the near end.
@@ -70,8 +68,8 @@ pub struct AdaptivePieces {
     shorter: usize,
     /// Pixels by which the first piece is shorter than its length.
     lead: u16,
-    /// Start of the next piece: its inverse depth, its coordinates, and the amount by which they
-    /// were clamped.
+    /// Start of the next piece: its inverse depth, its coordinates, and the amount by which they were
+    /// clamped.
     near: u64,
     here: (i32, i32),
     outside: u32,
@@ -80,8 +78,8 @@ pub struct AdaptivePieces {
 }
 
 impl AdaptivePieces {
-    /// Returns the pieces of the span of `len` pixels, at least 1, along `stepper`. For a row,
-    /// `row` is the x of its first pixel.
+    /// Returns the pieces of the span of `len` pixels, at least 1, along `stepper`. For a row, `row` is
+    /// the x of its first pixel.
     pub fn new(
         stepper: &PlaneStepper,
         len: u16,
@@ -160,8 +158,8 @@ impl AdaptivePieces {
         c > 0 && self.near * self.chords.cut(c) >= self.least
     }
 
-    /// Returns the steps of the next piece, at most `steps`, the forms at its end, and the
-    /// coordinates there, for a piece with a clamped end.
+    /// Returns the steps of the next piece, at most `steps`, the forms at its end, and the coordinates there,
+    /// for a piece with a clamped end.
     #[cold]
     fn clamped(&self, steps: u16) -> (u16, [i64; 3], ((i32, i32), u32)) {
         let shorter = LENGTHS.into_iter().filter(|&length| length < steps);
@@ -179,8 +177,8 @@ impl AdaptivePieces {
         (steps, end, coordinates(end, self.last))
     }
 
-    /// Returns what is left when no next piece exists: its first pixel, its number of pixels, and
-    /// its stepper from that pixel on.
+    /// Returns what is left when no next piece exists: its first pixel, its number of pixels, and its stepper
+    /// from that pixel on.
     pub fn rest(&self) -> Option<(u16, u16, PlaneStepper)> {
         let len = self.len - self.done;
         if len == 0 {
@@ -235,8 +233,8 @@ impl Iterator for AdaptivePieces {
     }
 }
 
-/// Returns the coordinates where the three forms have these values, clamped into the texture, and
-/// the amount by which they were clamped. Where c is not above zero the result is meaningless.
+/// Returns the coordinates where the three forms have these values, clamped into the texture, and the amount
+/// by which they were clamped. Where c is not above zero the result is meaningless.
 #[inline(always)]
 fn coordinates([a, b, c]: [i64; 3], last: (i32, i32)) -> ((i32, i32), u32) {
     let c = c.max(1);
@@ -251,8 +249,8 @@ fn coordinates([a, b, c]: [i64; 3], last: (i32, i32)) -> ((i32, i32), u32) {
     }
 }
 
-/// Returns a whole span as one piece, or nothing if an end is clamped. The span must be known to
-/// keep to the tolerance.
+/// Returns a whole span as one piece, or nothing if an end is clamped. The span must be known to keep to the
+/// tolerance.
 #[inline]
 pub(crate) fn whole(
     stepper: &PlaneStepper,

@@ -1,13 +1,13 @@
 //! The affine column mapper: texture coordinates stepped down the column in 16.16.
 //!
 //! [`Sides`] has the coordinates along a polygon's sides, and makes the stepper of a span: exactly
-//! between the two crossings, or by chapter 57's half steps. In a triangle the coordinates are one
-//! affine map of the screen. Where that map is within its legal range, [`AffineMap`] holds it and
-//! makes steppers at a fraction of the cost.
+//! between the two crossings, or by chapter 57's half steps. In a triangle the coordinates are one affine map
+//! of the screen. Where that map is within its legal range, [`AffineMap`] holds it and makes steppers at a
+//! fraction of the cost.
 //!
-//! Error against the exact affine coordinates: the step is cut to 2^-16 texel towards zero, so
-//! after n pixels the coordinate is off by less than n 2^-16 texel, at most 0.0037 texel over 240
-//! pixels. The half steps follow a different rule: see [`Sides::half_step`].
+//! Error against the exact affine coordinates: the step is cut to 2^-16 texel towards zero, so after n pixels
+//! the coordinate is off by less than n 2^-16 texel, at most 0.0037 texel over 240 pixels. The half steps
+//! follow a different rule: see [`Sides::half_step`].
 
 use modex::{HEIGHT, WIDTH};
 
@@ -25,14 +25,14 @@ struct Side {
 }
 
 impl Side {
-    /// Returns the side between `a` and `b`, given in either order, at the lines that go along
-    /// `axis`. A side that crosses no line gets a default value, which nothing reads.
+    /// Returns the side between `a` and `b`, given in either order, at the lines that go along `axis`. A side
+    /// that crosses no line gets a default value, which nothing reads.
     fn new(a: &Vertex, b: &Vertex, axis: Axis) -> Self {
         let (across, lines): (fn(&Vertex) -> i32, _) = match axis {
             Axis::Down => (|vertex| vertex.x, WIDTH),
             Axis::Right => (|vertex| vertex.y, HEIGHT),
         };
-        // Always forward, so that neighbours step along a shared edge with the same bits.
+        // Step forward always, so that neighbours step along a shared edge with the same bits.
         let (a, b) = if across(a) <= across(b) {
             (a, b)
         } else {
@@ -62,8 +62,7 @@ pub struct Sides {
 }
 
 impl Sides {
-    /// Returns the coordinates along the sides of `polygon` in `texture`, at the lines that go
-    /// along `axis`.
+    /// Returns the coordinates along the sides of `polygon` in `texture`, at the lines that go along `axis`.
     ///
     /// # Errors
     /// If the polygon is outside the legal range, or its coordinates are outside the texture.
@@ -89,14 +88,13 @@ impl Sides {
 
     /// Returns the stepper along a span of [`spans_and_crossings`] on the same axis.
     ///
-    /// The coordinates at the centres of the first and the last pixel are interpolated between the
-    /// two crossings, then clamped into the texture. The step between them is cut towards zero.
+    /// The coordinates at the centres of the first and the last pixel are interpolated between the two
+    /// crossings, then clamped into the texture. The step between them is cut towards zero.
     pub fn stepper(&self, span: &Span) -> AffineStepper {
         let [top, bottom] = span.ends;
-        // 24 fraction bits of height keep 2^-8 texel even where a whole texture is squeezed into
-        // 1/256 pixel. A height below 2^9 pixels then has at most 33 bits, and its product with a
-        // difference of coordinates (28 bits, 20 of them fraction) fits 64. Taller heights are
-        // scaled down.
+        // 24 fraction bits of height keep 2^-8 texel even where a whole texture is squeezed into 1/256 pixel.
+        // A height below 2^9 pixels then has at most 33 bits, and its product with a difference of
+        // coordinates (28 bits, 20 of them fraction) fits 64. Taller heights are scaled down.
         let mut height = (bottom.at - top.at) >> 8;
         let offset = |row: i64| (((row << 32) + (1 << 31)) - top.at) >> 8;
         let (first, len) = (i64::from(span.first), i64::from(span.len));
@@ -130,18 +128,17 @@ impl Sides {
 
     /// Returns the stepper by chapter 57's rule, translated to texels that begin at whole numbers.
     ///
-    /// The rule knows pixels, but not where in these pixels the crossings lie. It divides the
-    /// difference between the coordinates at the two crossings into n equal steps for the n pixels
-    /// between the crossings, and puts the first pixel half a step in.
+    /// The rule knows pixels, but not where in these pixels the crossings lie. It divides the difference
+    /// between the coordinates at the two crossings into n equal steps for the n pixels between the
+    /// crossings, and puts the first pixel half a step in.
     ///
-    /// Error against the exact affine coordinates: at most half a pixel's worth of texture along
-    /// the span. Proof: let the crossings be h pixels apart, let the first centre lie f past the
-    /// first crossing, and let the last centre lie g before the second. Then n - 1 + f + g = h,
-    /// with f and g from 0 to 1. Pixel i gets the coordinate that belongs (i + 1/2) h/n past the
-    /// first crossing, and its centre lies i + f past that crossing. With t = (i + 1/2)/n the
-    /// difference is (1 - t) (1/2 - f) + t (g - 1/2). This lies between 1/2 - f and g - 1/2, so its
-    /// magnitude is never above 1/2; it is 1/2 along the whole span where f = 0 and g = 1. In
-    /// addition the step is cut to 2^-16 texel towards zero, as in [`Sides::stepper`].
+    /// Error against the exact affine coordinates: at most half a pixel's worth of texture along the span.
+    /// Proof: let the crossings be h pixels apart, let the first centre lie f past the first crossing, and
+    /// let the last centre lie g before the second. Then n - 1 + f + g = h, with f and g from 0 to 1. Pixel i
+    /// gets the coordinate that belongs (i + 1/2) h/n past the first crossing, and its centre lies i + f past
+    /// that crossing. With t = (i + 1/2)/n the difference is (1 - t) (1/2 - f) + t (g - 1/2). This lies
+    /// between 1/2 - f and g - 1/2, so its magnitude is never above 1/2; it is 1/2 along the whole span where
+    /// f = 0 and g = 1. In addition the step is cut to 2^-16 texel towards zero, as in [`Sides::stepper`].
     pub fn half_step(&self, span: &Span) -> AffineStepper {
         // The first pixel whose centre is not above a crossing, on the screen or off it.
         let cell = |at: i64| (at + (1 << 31) - 1) >> 32;
@@ -156,8 +153,8 @@ impl Sides {
         .map(|[(from, last), (to, _)]| {
             let [from, to] = [from, to].map(|end| (end >> 16).clamp(0, i64::from(last) + 1));
             let step = (to - from) / steps;
-            // Computed from the full difference: the part that the step loses would add up over the
-            // pixels before the screen.
+            // Computed from the full difference: the part that the step loses would add up over the pixels
+            // before the screen.
             let first = from + (to - from) * (2 * before + 1) / (2 * steps);
             (first.min(i64::from(last)) as i32, step as i32)
         });
@@ -177,12 +174,12 @@ impl Sides {
     }
 }
 
-/// The single affine map of a triangle: both gradients are computed once, and a span needs no
-/// division unless it is cut at the texture's border.
+/// The single affine map of a triangle: both gradients are computed once, and a span needs no division unless
+/// it is cut at the texture's border.
 ///
-/// Legal input: three corners within [`AffineMap::REACH`] of the screen's middle in x and in y, in
-/// the texture or on its border, with less than 256 texels per pixel across and down the screen.
-/// Other polygons have no map; [`Sides`] makes their steppers.
+/// Legal input: three corners within [`AffineMap::REACH`] of the screen's middle in x and in y, in the
+/// texture or on its border, with less than 256 texels per pixel across and down the screen. Other polygons
+/// have no map; [`Sides`] makes their steppers.
 ///
 /// Error against the exact affine coordinates: less than 3 2^-16 texel at the first pixel (see
 /// [`AffineMap::new`]; this includes rounding down), and less than another n 2^-16 texel after n
@@ -193,8 +190,7 @@ pub struct AffineMap {
     v: Gradient,
     /// The last coordinate inside the texture, across and down.
     last: (i32, i32),
-    /// Whether every corner is far enough from the texture's border that rounding cannot lead out
-    /// of it.
+    /// Whether every corner is far enough from the texture's border that rounding cannot lead out of it.
     inside: bool,
 }
 
@@ -210,12 +206,10 @@ struct Gradient {
 }
 
 impl AffineMap {
-    /// Largest distance of a corner from the screen's middle in either direction: 512 pixels, in
-    /// 1/256 pixel.
+    /// Largest distance of a corner from the screen's middle in either direction: 512 pixels, in 1/256 pixel.
     pub const REACH: i32 = 512 * 256;
 
-    /// Returns the map of `polygon` in `texture`, or nothing if the polygon is outside the legal
-    /// range.
+    /// Returns the map of `polygon` in `texture`, or nothing if the polygon is outside the legal range.
     #[inline]
     pub fn new(polygon: &[Vertex], texture: &Texture<'_>) -> Option<Self> {
         let [a, b, c] = polygon else {
@@ -235,9 +229,9 @@ impl AffineMap {
         if !(legal(a) && legal(b) && legal(c)) {
             return None;
         }
-        // Differences of positions are at most 2^18, and of coordinates 2^24. Three points lie in a
-        // box, and the parallelogram that they span is no larger than the box: 2^36 with two
-        // positions, and 2^42 with a coordinate for one side.
+        // Differences of positions are at most 2^18, and of coordinates 2^24. Three points lie in a box, and
+        // the parallelogram that they span is no larger than the box: 2^36 with two positions, and 2^42 with
+        // a coordinate for one side.
         let spanned = |p: (i32, i32), q: (i32, i32)| {
             i64::from(p.0) * i64::from(q.1) - i64::from(p.1) * i64::from(q.0)
         };
@@ -246,10 +240,9 @@ impl AffineMap {
         if area == 0 {
             return None;
         }
-        // One division. `over` is off by less than 1, which moves a gradient by less than 2^42
-        // 2^-38 of its units, that is 2^-28 texel per pixel, and a coordinate by 2^-17 texel over
-        // 2^10 pixels each way. The last places of the gradients and of the origin add less than
-        // another 2^-20.
+        // One division. `over` is off by less than 1, which moves a gradient by less than 2^42 2^-38 of its
+        // units, that is 2^-28 texel per pixel, and a coordinate by 2^-17 texel over 2^10 pixels each way.
+        // The last places of the gradients and of the origin add less than another 2^-20.
         let over = (1 << 62) / area;
         let gradient = |at: [i32; 3]| {
             let change = (at[1] - at[0], at[2] - at[0]);
@@ -267,8 +260,8 @@ impl AffineMap {
                 step: (down / (1 << 16)) as i32,
             })
         };
-        // A coordinate is off by 3 2^-16 texel at the first pixel. The step, which is cut towards
-        // zero, leads no further out.
+        // A coordinate is off by 3 2^-16 texel at the first pixel. The step, which is cut towards zero, leads
+        // no further out.
         let clear = |at: [i32; 3], last: i32| at.iter().all(|at| (4..last - 4).contains(at));
         let (u, v) = ([a.u, b.u, c.u], [a.v, b.v, c.v]);
         Some(Self {
@@ -279,9 +272,9 @@ impl AffineMap {
         })
     }
 
-    /// Returns the map with these values at the centre of pixel (0, 0) and these steps to the right
-    /// and down; 32 fraction bits, steps within +-2^40. `inside` states that no pixel is within 4
-    /// 2^-16 texel of the texture's border.
+    /// Returns the map with these values at the centre of pixel (0, 0) and these steps to the right and down;
+    /// 32 fraction bits, steps within +-2^40. `inside` states that no pixel is within 4 2^-16 texel of the
+    /// texture's border.
     pub(crate) fn of(maps: [(i64, i64, i64); 2], texture: &Texture<'_>, inside: bool) -> Self {
         let [u, v] = maps.map(|(origin, right, down)| Gradient {
             origin,
@@ -299,27 +292,27 @@ impl AffineMap {
 
     /// Returns the stepper down a span of [`spans()`] or [`columns`](crate::scan::columns).
     ///
-    /// If the first or the last pixel lies outside the texture, which only rounding and the far
-    /// border cause, both are clamped into it, and the step is computed from the clamped ends.
+    /// If the first or the last pixel lies outside the texture, which only rounding and the far border cause,
+    /// both are clamped into it, and the step is computed from the clamped ends.
     #[inline]
     pub fn stepper<End>(&self, span: &Span<End>) -> AffineStepper {
         let (x, y) = (i64::from(span.line), i64::from(span.first));
         let steps = i64::from(span.len) - 1;
-        let stepped = |along: &Gradient, last: i32| {
-            let first = along.origin + x * along.right + y * along.down;
+        let stepped = |gradient: &Gradient, last: i32| {
+            let first = gradient.origin + x * gradient.right + y * gradient.down;
             let start = first >> 16;
             if self.inside {
-                return (start as i32, along.step);
+                return (start as i32, gradient.step);
             }
-            let stop = start + steps * i64::from(along.step);
+            let stop = start + steps * i64::from(gradient.step);
             // As an unsigned number, a negative coordinate is above every size.
             let inside = |at: i64| at as u64 <= last as u64;
             if inside(start) && inside(stop) {
-                return (start as i32, along.step);
+                return (start as i32, gradient.step);
             }
             let clamped = |at: i64| at.clamp(0, last.into()) as i32;
             let start = clamped(start);
-            let stop = clamped((first + steps * along.down) >> 16);
+            let stop = clamped((first + steps * gradient.down) >> 16);
             // A span of one pixel has no step.
             (start, (stop - start) / (steps as i32).max(1))
         };
@@ -388,8 +381,8 @@ fn map_sides(
 ) -> Result<(), Dropped> {
     let sides = Sides::new(face.polygon, texture, axis)?;
     spans_and_crossings(axis, face.polygon, |span| {
-        // The span has the stepper that is actually drawn: its reference implementation does not
-        // know the loops.
+        // The span gets the stepper that the loop actually draws, because the reference implementation does
+        // not know the loops.
         let stepper = by.effective(rule(&sides, &span));
         sink(MappedSpan::new(axis, &span, SpanKind::Affine(stepper)));
     })

@@ -1,11 +1,11 @@
 //! Clamped steps: constant steps that may leave the texture, cut into pieces where they do.
 //!
-//! An approximation is only close to the exact coordinates, and the exact coordinates of a pixel at
-//! the polygon's border lie at the texture's border. So the steps may cross the border by as much
-//! as its error. Clamping one of the ends into the texture would bend the whole span. Instead, the
-//! span is cut into pieces that lie inside and pieces that lie beyond a border, and beyond a border
-//! the coordinate stays on the last texel. Every pixel then has its own coordinates, clamped, and
-//! clamping brings them no further from any coordinates inside the texture. No inner loop clamps.
+//! An approximation is only close to the exact coordinates, and the exact coordinates of a pixel at the
+//! polygon's border lie at the texture's border. So the steps may cross the border by as much as its error.
+//! Clamping one of the ends into the texture would bend the whole span. Instead, the span is cut into pieces
+//! that lie inside and pieces that lie beyond a border, and beyond a border the coordinate stays on the last
+//! texel. Every pixel then has its own coordinates, clamped, and clamping brings them no further from any
+//! coordinates inside the texture. No inner loop clamps.
 
 use crate::loops::AffineStepper;
 use crate::plane::Reciprocal;
@@ -45,9 +45,8 @@ impl ClampedStep {
                     && self.after(len - 1).into_iter().all(near))
     }
 
-    /// Passes the pieces over `len` pixels, at most five, to `sink`: the index of each
-    /// piece's first pixel, its length in pixels, and its stepper inside a texture whose last
-    /// coordinates are `last`.
+    /// Passes the pieces over `len` pixels, at most five, to `sink`: the index of each piece's first pixel,
+    /// its length in pixels, and its stepper inside a texture whose last coordinates are `last`.
     pub(crate) fn pieces(
         &self,
         len: u16,
@@ -66,8 +65,8 @@ impl ClampedStep {
         let mut first = 0;
         while first < len {
             let here = positions(first);
-            // The coordinates are monotone, so a position that holds at two pixels holds between
-            // them. Find the piece's last pixel by bisection.
+            // The coordinates are monotone, so a position that holds at two pixels holds between them. Find
+            // the piece's last pixel by bisection.
             let (mut same, mut end) = (first, len);
             if positions(len - 1) == here {
                 same = len - 1;
@@ -104,8 +103,7 @@ pub(crate) struct ConstantDepthForms {
 }
 
 impl ConstantDepthForms {
-    /// Returns the steps over `len` pixels, or nothing if c is not above zero or the steps lead out
-    /// of reach.
+    /// Returns the steps over `len` pixels, or nothing if c is not above zero or the steps lead out of reach.
     pub(crate) fn step(&self, len: u16) -> Option<ClampedStep> {
         let [a, b, c] = self.at;
         let over = Reciprocal::unbiased(c)?;

@@ -1,13 +1,13 @@
 //! The constant-z mapper: walls and floors, where one division serves a whole span.
 //!
-//! Where the plane's c does not change down the columns (a wall) or along the rows (a floor), a
-//! span has a single depth: u = a / c and v = b / c are linear along it, so affine steps are
-//! exact perspective. A wall whose u is constant as well (its texture stands upright) steps one
-//! coordinate only. For any other plane, the exact mapper draws the columns.
+//! Where the plane's c does not change down the columns (a wall) or along the rows (a floor), a span has a
+//! single depth: u = a / c and v = b / c are linear along it, so affine steps are exact perspective. A wall
+//! whose u is constant as well (its texture stands upright) steps one coordinate only. For any other plane,
+//! the exact mapper draws the columns.
 //!
-//! Legal input: any face. Error against the quotient of the plane's integers, clamped into the
-//! texture: at most [`drift`]. Where c is not above zero, or the steps lead further than 4096
-//! texels, the span is drawn exactly.
+//! Legal input: any face. Error against the quotient of the plane's integers, clamped into the texture: at
+//! most [`drift`]. Where c is not above zero, or the steps lead further than 4096 texels, the span is drawn
+//! exactly.
 
 use super::clamped::ConstantDepthForms;
 use super::mapped_span::{MappedSpan, SpanKind};
@@ -16,10 +16,9 @@ use crate::loops::{AffineStepper, UprightStepper};
 use crate::plane::{Face, Plane, PlaneStepper};
 use crate::scan::spans;
 
-/// Returns the largest error of a coordinate at pixel `i` of a span of constant depth, 16.16. The
-/// step is rounded to nearest, the start is rounded down, and the reciprocal is off by 2^-31 of its
-/// value: at the 4096 texels that steps may reach, that is 1/8 of a unit in the start and 1/8 in
-/// the steps.
+/// Returns the largest error of a coordinate at pixel `i` of a span of constant depth, 16.16. The step is
+/// rounded to nearest, the start is rounded down, and the reciprocal is off by 2^-31 of its value: at the
+/// 4096 texels that steps may reach, that is 1/8 of a unit in the start and 1/8 in the steps.
 pub fn drift(i: u16) -> i32 {
     i32::from(i) / 2 + 3
 }

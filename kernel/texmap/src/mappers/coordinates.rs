@@ -15,8 +15,8 @@ pub(crate) enum Coordinates {
 }
 
 impl Coordinates {
-    /// Returns the coordinates of a span of `len` pixels, which is not adaptive: an adaptive span's
-    /// pieces have their own coordinates.
+    /// Returns the coordinates of a span of `len` pixels, which is not adaptive: an adaptive span's pieces
+    /// have their own coordinates.
     pub fn new(kind: SpanKind, len: u16, texture: &Texture<'_>) -> Self {
         match kind {
             SpanKind::Affine(stepper) => Self::Affine(stepper),

@@ -1,25 +1,22 @@
-//! The exact perspective mapper: the texel of the quotient at every pixel, with no rounding but the
-//! floor.
+//! The exact perspective mapper: the texel of the quotient at every pixel, with no rounding but the floor.
 //!
-//! Legal input: a plane as [`Plane::new`] makes it, and a column on the screen. Error: zero against
-//! the quantised forms; [`crate::plane`] bounds the effect of quantising them.
+//! Legal input: a plane as [`Plane::new`] makes it, and a column on the screen. Error: zero against the
+//! quantised forms; [`crate::plane`] bounds the effect of quantising them.
 //!
 //! # Why the loop does not clamp
 //!
-//! With w and h the width and height of the texture, a pixel needs no clamp when a >= 0, b >= 0,
-//! w c - a > 0 and h c - b > 0; then c is above zero too. Each of the four is linear down the
-//! column, so if all hold at two pixels, they hold at every pixel between. So the loop searches
-//! from the top and from the bottom for the first pixel that needs no clamp, and clamps only the
-//! pixels outside these two.
+//! With w and h the width and height of the texture, a pixel needs no clamp when a >= 0, b >= 0, w c - a > 0
+//! and h c - b > 0; then c is above zero too. Each of the four is linear down the column, so if all hold at
+//! two pixels, they hold at every pixel between. So the loop searches from the top and from the bottom for
+//! the first pixel that needs no clamp, and clamps only the pixels outside these two.
 //!
 //! # Why most pixels are not divided
 //!
-//! Where the coordinates curve little enough, the loop first makes a linear estimate, with a margin
-//! from [`crate::plane::bounds`] that its error never exceeds. If the estimate minus the margin and
-//! the estimate plus the margin have the same floor, the quotient between them has it too, and that
-//! floor *is* the texel. Otherwise the estimate lies within the margin of a texel's border, and the
-//! loop divides. With the largest margin, `MARGIN`, it divides at most one pixel in 8 if the
-//! texture coordinates are spread evenly.
+//! Where the coordinates curve little enough, the loop first makes a linear estimate, with a margin from
+//! [`crate::plane::bounds`] that its error never exceeds. If the estimate minus the margin and the estimate
+//! plus the margin have the same floor, the quotient between them has it too, and that floor *is* the texel.
+//! Otherwise the estimate lies within the margin of a texel's border, and the loop divides. With the largest
+//! margin, `MARGIN`, it divides at most one pixel in 8 if the texture coordinates are spread evenly.
 //!
 //! [`Plane::new`]: crate::Plane::new
 
@@ -103,8 +100,8 @@ fn divided(texture: &Texture<'_>, mut stepper: PlaneStepper, column: Column<'_>)
     column.fill(|| quotient(texture, stepper.next()));
 }
 
-/// Returns the longest pieces whose linear estimate is good enough, and the estimate's margin;
-/// nothing if no pieces are.
+/// Returns the longest pieces whose linear estimate is good enough, and the estimate's margin; nothing if no
+/// pieces are.
 fn estimate(texture: &Texture<'_>, stepper: &PlaneStepper, len: u16) -> Option<(Subdivision, i32)> {
     if len < LEAST {
         return None;

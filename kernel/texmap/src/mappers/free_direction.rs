@@ -1,32 +1,30 @@
-//! The free-direction mapper: spans along the lines of constant depth, in whatever direction they
-//! run.
+//! The free-direction mapper: spans along the lines of constant depth, in whatever direction they run.
 //!
-//! Every plane has lines of constant depth on the screen: along them c stays constant, so c.right
-//! dx + c.down dy = 0. Along such a line u and v are linear, and one division serves the
-//! whole line. Pixels do not lie exactly on the line, so the mapper draws it through the pixels
-//! nearest to it. A line nearer the horizontal has one pixel in every column that it crosses, and a
-//! line nearer the vertical has one pixel in every row. All lines are copies of one line, moved by
-//! whole pixels (down, or to the right), so each pixel of the screen lies on exactly one line.
+//! Every plane has lines of constant depth on the screen: along them c stays constant, so
+//! c.right dx + c.down dy = 0. Along such a line u and v are linear, and one division serves the whole line.
+//! Pixels do not lie exactly on the line, so the mapper draws the line through the pixels nearest to it. A
+//! line nearer the horizontal has one pixel in every column that it crosses, and a line nearer the vertical
+//! has one pixel in every row.
+//! All lines are copies of one line, moved by whole pixels (down, or to the right), so each pixel of the
+//! screen lies on exactly one line.
 //!
 //! # Which pixels
 //!
-//! Exactly the pixels of coverage, each once. Take a line nearer the horizontal, S(x) whole pixels
-//! down at column x. Pixel (x, y) lies on line y - S(x), so an inside span of column x becomes a
-//! range of lines. From a column to the next, the mapper closes the lines that have left the
-//! ranges, and each becomes a job from the column where it was opened; it opens the lines that are
-//! new in the ranges. Only the differences are examined. Nearer the vertical, columns and rows
-//! change places.
+//! Exactly the pixels of coverage, each once. Take a line nearer the horizontal, S(x) whole pixels down at
+//! column x. Pixel (x, y) lies on line y - S(x), so an inside span of column x becomes a range of lines. From
+//! a column to the next, the mapper closes the lines that have left the ranges, and each becomes a job from
+//! the column where it was opened; it opens the lines that are new in the ranges. Only the differences are
+//! examined. Nearer the vertical, columns and rows change places.
 //!
 //! # Error
 //!
-//! Across its direction, the line passes up to half a pixel beside the centres of its pixels: down
-//! the column for a line nearer the horizontal. In that direction u is a hyperbola. So the error is
-//! at most the sum of three terms: the larger of u's differences between the centre and the two
-//! places [`LARGEST_DISTANCE`] above and below it; [`drift`](super::constant_z::drift) for the
-//! pixel's number in its line; and one unit in the last place of the forms for each of the line's
-//! pixels. To first order that is half a pixel's worth of the texture's gradient across the line,
-//! and this error does occur. Where c is not above zero on a line, or the line's coordinates go
-//! further than 4096 texels, its pixels are drawn exactly.
+//! Across its direction, the line passes up to half a pixel beside the centres of its pixels: down the column
+//! for a line nearer the horizontal. In that direction u is a hyperbola. So the error is at most the sum of
+//! three terms: the larger of u's differences between the centre and the two places [`LARGEST_DISTANCE`]
+//! above and below it; [`drift`](super::constant_z::drift) for the pixel's number in its line; and one unit
+//! in the last place of the forms for each of the line's pixels. To first order that is half a pixel's worth
+//! of the texture's gradient across the line, and this error does occur. Where c is not above zero on a line,
+//! or the line's coordinates go further than 4096 texels, its pixels are drawn exactly.
 
 use super::clamped::ConstantDepthForms;
 use super::mapped_span::{MappedSpan, SpanKind};
@@ -36,14 +34,13 @@ use crate::plane::{Face, Form, Plane, PlaneStepper};
 use crate::scan::{MAX_SPANS, spans};
 use modex::{HEIGHT, WIDTH};
 
-/// Largest distance of a line from a pixel's centre, in 2^-14 pixel: half a pixel, plus the error
-/// of the offset's steps.
+/// Largest distance of a line from a pixel's centre, in 2^-14 pixel: half a pixel, plus the error of the
+/// offset's steps.
 pub const LARGEST_DISTANCE: i32 = (1 << 13) + 1;
 /// Half a pixel.
 const HALF: i32 = 1 << (LINE_FRACTION - 1);
-/// Upper limit of the number of lines that meet the screen: one for each pixel of the first column,
-/// and one for each pixel that the slope, at most 1, shifts a line over the width. Rows have
-/// equally many.
+/// Upper limit of the number of lines that meet the screen: one for each pixel of the first column, and one
+/// for each pixel that the slope, at most 1, shifts a line over the width. Rows have equally many.
 const LINES: usize = WIDTH + HEIGHT;
 
 /// The lines of constant depth of a plane.
@@ -102,8 +99,8 @@ impl ConstantDepthLines {
             Axis::Right => WIDTH,
             Axis::Down => HEIGHT,
         };
-        // Lines are numbered from 0, so that no line lies before the screen's first
-        // pixel. A line without slope passes through the pixels' centres.
+        // Lines are numbered from 0, so that no line lies before the screen's first pixel. A line without
+        // slope passes through the pixels' centres.
         let furthest = HALF + slope * (pixels as i32 - 1);
         let start = HALF - (furthest.max(HALF) >> LINE_FRACTION << LINE_FRACTION);
         Self {
@@ -120,8 +117,7 @@ impl ConstantDepthLines {
         self.start + self.slope * i32::from(along)
     }
 
-    /// Returns the number of the line through the pixel at these positions along the axis and
-    /// across it.
+    /// Returns the number of the line through the pixel at these positions along the axis and across it.
     fn line(&self, along: u16, across: u16) -> usize {
         (i32::from(across) - (self.offset(along) >> LINE_FRACTION)) as usize
     }

@@ -1,7 +1,7 @@
 //! Linear pieces: perspective with constant steps between exact quotients.
 //!
-//! The step is cut towards zero. So nothing between two ends inside the texture lies outside it,
-//! and no loop clamps. After n pixels the cut step is off by less than n 2^-16 texel.
+//! The step is cut towards zero. So nothing between two ends inside the texture lies outside it, and no loop
+//! clamps. After n pixels the cut step is off by less than n 2^-16 texel.
 
 use core::hint::black_box;
 
@@ -32,8 +32,8 @@ pub(crate) fn map(
     )
 }
 
-/// Passes the spans of a face to `sink`, in pieces of 16 pixels along columns or rows, whichever
-/// direction changes the depth less.
+/// Passes the spans of a face to `sink`, in pieces of 16 pixels along columns or rows, whichever direction
+/// changes the depth less.
 ///
 /// # Errors
 /// As for [`map`].
@@ -57,8 +57,8 @@ pub(crate) fn map_row_or_column(
 /// A function that draws a column in linear pieces, each with a [`Draw`].
 pub(crate) type DrawLinear = fn(&Texture<'_>, &PlaneStepper, Subdivision, Draw, Column<'_>);
 
-/// Returns the function that draws a column in linear pieces on this CPU, for the loop `by`. The
-/// fastest loops for padded textures draw the pieces in place; the others use the [`Draw`].
+/// Returns the function that draws a column in linear pieces on this CPU, for the loop `by`. The fastest
+/// loops for padded textures draw the pieces in place; the others use the [`Draw`].
 pub(crate) fn drawing(by: Loop) -> DrawLinear {
     #[cfg(target_arch = "x86_64")]
     match by {
@@ -82,8 +82,8 @@ pub(crate) fn drawing(by: Loop) -> DrawLinear {
     }
 }
 
-/// Draws a column that is linear in each piece. `draw_piece` draws a piece. `draw_eights` draws
-/// pieces whose pixels come in whole eights, where there are enough pieces to make it worthwhile.
+/// Draws a column that is linear in each piece. `draw_piece` draws a piece. `draw_eights` draws pieces whose
+/// pixels come in whole eights, where there are enough pieces to make it worthwhile.
 #[inline(always)]
 fn draw(
     texture: &Texture<'_>,
@@ -94,8 +94,8 @@ fn draw(
     mut column: Column<'_>,
 ) {
     let (last, mut left) = (texture.last(), column.len() - 1);
-    // If both ends of the span are inside the texture and in front of the eye, everything between
-    // them is too.
+    // If both ends of the span are inside the texture and in front of the eye, everything between them is
+    // too.
     let [width, height] = [last.0, last.1].map(|last| i64::from(last >> 16) + 1);
     let needs_no_clamp = |[a, b, c]: [i64; 3]| a >= 0 && b >= 0 && a < width * c && b < height * c;
     if !(needs_no_clamp(stepper.at) && needs_no_clamp(stepper.after(left))) {
@@ -112,8 +112,8 @@ fn draw(
         Subdivision::Powers => LONGEST_POWER,
         Subdivision::Whole => 0,
     };
-    // Pieces of equally many steps, a power of two. The last piece has one pixel more, so it
-    // is not among them.
+    // Pieces of equally many steps, a power of two. The last piece has one pixel more, so it is not among
+    // them.
     if left > alike
         && alike >= 8
         && alike.is_power_of_two()
@@ -130,8 +130,8 @@ fn draw(
             (delta + up) >> bits
         };
         let [mut a, mut b, mut c] = [at[0], at[1], at[2] + stride[2]];
-        // Hide the division from the compiler, which would otherwise move each division to the
-        // place of its use.
+        // Hide the division from the compiler, which would otherwise move each division to the place of its
+        // use.
         let mut over = black_box(LargeReciprocal::new(c));
         for pixels in pixels.chunks(alike) {
             a += stride[0];

@@ -1,5 +1,5 @@
-//! Mapped spans: what a mapper yields. A mapped span is a span of pixels with the stepper of its
-//! texture coordinates.
+//! Mapped spans: what a mapper yields. A mapped span is a span of pixels with the stepper of its texture
+//! coordinates.
 
 use crate::geometry::{Axis, Dropped};
 use crate::loops::{AffineStepper, LineStepper, UprightStepper};
@@ -28,8 +28,8 @@ pub enum SpanKind {
 impl SpanKind {
     /// Returns the part of the span from pixel `first` on.
     ///
-    /// Pieces start again at the part's first pixel. They are no longer than the pieces of the
-    /// whole span, and lie within it, so every [bound](crate::plane::bounds) still holds.
+    /// Pieces start again at the part's first pixel. They are no longer than the pieces of the whole span,
+    /// and lie within it, so every [bound](crate::plane::bounds) still holds.
     pub(crate) fn after(self, first: u16) -> Self {
         let after = |stepper: PlaneStepper| PlaneStepper {
             at: stepper.after(first),
@@ -75,8 +75,8 @@ impl MappedSpan {
     }
 }
 
-/// Passes the spans of a face along `axis` to `sink`; `kind` makes the kind of each span from its
-/// plane stepper.
+/// Passes the spans of a face along `axis` to `sink`; `kind` makes the kind of each span from its plane
+/// stepper.
 ///
 /// # Errors
 /// If the polygon is outside the legal range; then `sink` has received no span.

@@ -23,8 +23,7 @@ pub enum Mapper {
     Linear(Subdivision),
     /// Perspective: quadratic pieces in each column.
     Quadratic(Subdivision),
-    /// Linear pieces of 16 pixels, along columns or rows, whichever direction changes the depth
-    /// less.
+    /// Linear pieces of 16 pixels, along columns or rows, whichever direction changes the depth less.
     RowOrColumn,
     /// Affine in tiles of 16 x 16 pixels.
     Tiles,
@@ -40,7 +39,8 @@ pub enum Mapper {
 type Named = (&'static str, Mapper, &'static str);
 
 impl Mapper {
-    /// Every mapper with its name and a line of description, from the sources' first to the exact.
+    /// Every mapper with its name and a line of description, from the sources' first mapper to the exact
+    /// mapper.
     pub const ALL: &'static [Named] = &[
         (
             "row-multiply",
@@ -199,8 +199,8 @@ impl Mapper {
         ),
     ];
 
-    /// The names that mappers had before, each with its present name. [`Mapper::parse`] accepts
-    /// them for one version.
+    /// The former names of mappers, each with the present name. [`Mapper::parse`] accepts them for one
+    /// version.
     pub const RENAMED: [(&'static str, &'static str); 5] = [
         ("two-steps", "step-table"),
         ("joined", "one-accumulator"),
@@ -215,8 +215,8 @@ impl Mapper {
         found.map(|&(_, new)| new)
     }
 
-    /// Returns the mapper with this name, if any: a name in [`Mapper::ALL`], a former name, or
-    /// `within-` and any [`Tolerance`].
+    /// Returns the mapper with this name, if any: a name in [`Mapper::ALL`], a former name, or `within-` and
+    /// any [`Tolerance`].
     pub fn parse(name: &str) -> Option<Self> {
         let name = Self::renamed(name).unwrap_or(name);
         if let Some(tolerance) = name.strip_prefix("within-") {
@@ -226,16 +226,16 @@ impl Mapper {
         named.map(|&(_, mapper, _)| mapper)
     }
 
-    /// Returns the mapper's name in [`Mapper::ALL`], or an empty string for a tolerance that is not
-    /// listed there. `Display` writes the names of all mappers.
+    /// Returns the mapper's name in [`Mapper::ALL`], or an empty string for a tolerance that is not listed
+    /// there. `Display` writes the names of all mappers.
     pub fn name(self) -> &'static str {
         let named = Self::ALL.iter().find(|(_, mapper, _)| *mapper == self);
         named.map_or("", |(name, ..)| name)
     }
 
-    /// Returns a faster, less accurate mapper for objects in motion, or `None` if no such mapper
-    /// exists. A tolerance below two texels becomes two texels, and an exact or nearly exact mapper
-    /// becomes linear pieces.
+    /// Returns the mapper of reduced quality, which is faster and less accurate, for objects in motion, or
+    /// `None` if this mapper has no reduced quality. A tolerance below two texels becomes two texels, and an
+    /// exact or nearly exact mapper becomes linear pieces.
     pub fn lower(self) -> Option<Self> {
         const UNSEEN: Tolerance = Tolerance::new(2, 1).expect("two texels are legal");
         match self {
@@ -265,8 +265,7 @@ impl Mapper {
     ///
     /// # Errors
     /// If the polygon is outside the legal range; then `sink` has received no span.
-    // `sink` is dynamic, so that a program has this code once. Generic over `sink`, it would have
-    // ten copies.
+    // `sink` is dynamic, so that a program has this code once. Generic over `sink`, it would have ten copies.
     pub(crate) fn map(
         self,
         face: &Face<'_>,
@@ -320,13 +319,13 @@ mod tests {
 
     /// One list may hold jobs of both mappers.
     #[test]
-    fn what_is_lower_is_drawn_by_the_same_loops_and_no_lower_again() {
+    fn a_reduced_mapper_is_drawn_by_the_same_loops_and_is_not_reduced_again() {
         let mut some = 0;
         for (name, mapper, _) in Mapper::ALL {
-            if let Some(lower) = mapper.lower() {
+            if let Some(reduced) = mapper.lower() {
                 some += 1;
-                assert_eq!(lower.style(), mapper.style(), "{name}");
-                assert_eq!(lower.lower(), None, "{name}");
+                assert_eq!(reduced.style(), mapper.style(), "{name}");
+                assert_eq!(reduced.lower(), None, "{name}");
             }
         }
         assert_eq!(Mapper::Exact.lower(), Mapper::parse("linear-16"));

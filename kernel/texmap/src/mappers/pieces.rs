@@ -1,10 +1,8 @@
-//! Pieces of a span in perspective: exact quotients at the ends of each piece, and a polynomial
-//! between.
+//! Pieces of a span in perspective: exact quotients at the ends of each piece, and a polynomial between.
 //!
-//! A span of `len` pixels has `len - 1` steps from its first pixel's centre to its last. The steps
-//! are cut into pieces. Neighbouring pieces share the quotient between them, and the last piece
-//! ends *on* the span's last pixel. So a span of one pixel has no piece, and nothing is divided by
-//! zero.
+//! A span of `len` pixels has `len - 1` steps from its first pixel's centre to its last. The steps are cut
+//! into pieces. Neighbouring pieces share the quotient between them, and the last piece ends *on* the span's
+//! last pixel. So a span of one pixel has no piece, and nothing is divided by zero.
 
 use crate::geometry::Texture;
 use crate::loops::AffineStepper;
@@ -26,9 +24,9 @@ pub(crate) const INVERSES: [u64; MAX_STEPS + 1] = {
 
 /// Returns `delta / steps`, cut towards zero; |delta| < 2^24, steps 1 to 319.
 ///
-/// Below 2^8 steps the result is floor(delta m / 2^32), where m is the next whole number above 2^32
-/// / steps. Its error is at most delta / 2^32 < 2^-8 upward, and a quotient is at least 1 / steps
-/// below the next whole number.
+/// Below 2^8 steps the result is floor(delta m / 2^32), where m is the next whole number above 2^32 / steps.
+/// Its error is at most delta / 2^32 < 2^-8 upward, and a quotient is at least 1 / steps below the next whole
+/// number.
 #[inline]
 pub fn over(delta: i32, steps: u16) -> i32 {
     if steps.is_power_of_two() {

@@ -1,28 +1,26 @@
 //! Quadratic pieces: perspective with a parabola through three exact quotients of each piece.
 //!
-//! A quadratic piece passes through the quotients at both ends and at the middle. The middle may
-//! lie between two pixels: the forms there are half the sum of those at the ends. Let u0, um and u1
-//! be the coordinates at the start, the middle and the end, d = u1 - u0, K = 2 (u0 + u1 - 2 um),
-//! and y from 0 to 1 the position within the piece. The coordinate is
+//! A quadratic piece passes through the quotients at both ends and at the middle. The middle may lie between
+//! two pixels: the forms there are half the sum of those at the ends. Let u0, um and u1 be the coordinates at
+//! the start, the middle and the end, d = u1 - u0, K = 2 (u0 + u1 - 2 um), and y from 0 to 1 the position
+//! within the piece. The coordinate is
 //!
 //! ```text
 //! u0 + (d - K) y + K y^2
 //! ```
 //!
-//! Over n steps of one pixel, the value grows by S at the first step, and S grows by T at each
-//! step, with T = 2 K / n^2 and S = (d - K) / n + K / n^2. (S and T are differences, so they are
-//! not the polynomial's two coefficients, which belong to infinitely small steps.) They have 48
-//! fraction bits. S is off by less than 2^10 units in the last place and T by less than 2^11 / n
-//! (see `share`, with |d - K| <= 2 |d| <= 2^25), and both are exact where n is a power of two. So
-//! over 319 pixels the value drifts by less than 2^-26 texel. It starts half of 2^-16 higher, so
-//! that cutting off the remaining bits rounds to nearest, and a drift below zero or beyond the last
-//! coordinate is cut off with them.
+//! Over n steps of one pixel, the value grows by S at the first step, and S grows by T at each step, with
+//! T = 2 K / n^2 and S = (d - K) / n + K / n^2. (S and T are differences, so they are not the polynomial's
+//! two coefficients, which belong to infinitely small steps.) They have 48 fraction bits. S is off by less
+//! than 2^10 units in the last place and T by less than 2^11 / n (see `share`, with
+//! |d - K| <= 2 |d| <= 2^25), and both are exact where n is a power of two. So over 319 pixels the value
+//! drifts by less than 2^-26 texel. It starts half of 2^-16 higher, so that cutting off the remaining bits
+//! rounds to nearest, and a drift below zero or beyond the last coordinate is cut off with them.
 //!
-//! A quadratic may leave the interval between its ends. It stays inside if it does not turn between
-//! them, that is, where |K| <= |d|: its slope is d - K at one end and d + K at the other. A piece
-//! that turns is drawn as two straight halves through the same three points, and these stay inside.
-//! Without clamped ends |K| / |d| is 2 (r - 1) / (r + 1), where r is the piece's depth ratio, so a
-//! piece turns when r is above 3.
+//! A quadratic may leave the interval between its ends. It stays inside if it does not turn between them,
+//! that is, where |K| <= |d|: its slope is d - K at one end and d + K at the other. A piece that turns is
+//! drawn as two straight halves through the same three points, and these stay inside. Without clamped ends
+//! |K| / |d| is 2 (r - 1) / (r + 1), where r is the piece's depth ratio, so a piece turns when r is above 3.
 
 use modex::Column;
 
@@ -50,9 +48,9 @@ pub(crate) fn map(
 
 /// Returns `delta 2^32 / steps`, and that divided by `steps` again; |delta| < 2^27.
 ///
-/// The inverse in the table is less than one below 2^48 / steps. So the first result is off by less
-/// than 2^27 / 2^16 + 1 < 2^12, and the second by less than 2^59 / 2^48 + 2^12 / steps + 1, which
-/// is below 2^13. Both are exact where `steps` is a power of two up to 2^16.
+/// The inverse in the table is less than one below 2^48 / steps. So the first result is off by less than
+/// 2^27 / 2^16 + 1 < 2^12, and the second by less than 2^59 / 2^48 + 2^12 / steps + 1, which is below 2^13.
+/// Both are exact where `steps` is a power of two up to 2^16.
 #[inline]
 fn share(delta: i64, steps: u16) -> (i64, i64) {
     if steps.is_power_of_two() {
@@ -75,7 +73,7 @@ struct Path {
 
 impl Path {
     /// Returns the path from `u` in constant steps of `step`, both 16.16.
-    fn straight(u: i32, step: i32) -> Self {
+    fn linear(u: i32, step: i32) -> Self {
         Self {
             at: i64::from(u) << 32,
             step: i64::from(step) << 32,
@@ -109,8 +107,8 @@ impl Path {
     }
 }
 
-/// Returns a coordinate over a quadratic piece: the path of its first half and of its second half,
-/// and whether the piece is two straight halves. If it is not, the second path continues the first.
+/// Returns a coordinate over a quadratic piece: the path of its first half and of its second half, and
+/// whether the piece is two straight halves. If it is not, the second path continues the first.
 fn arc([from, middle, to]: [i32; 3], steps: u16) -> ([Path; 2], bool) {
     let [from, middle, to] = [from, middle, to].map(i64::from);
     let rounded = |u: i64| (u << 32) + (1 << 31);
@@ -156,7 +154,7 @@ impl Quadratic {
         let piece = cuts.next();
         let Piece { from, to, .. } = piece;
         if piece.steps == 0 {
-            let paths = [from.0, from.1].map(|u| [Path::straight(u, 0); 2]);
+            let paths = [from.0, from.1].map(|u| [Path::linear(u, 0); 2]);
             return Self {
                 pixels: piece.pixels,
                 second: piece.pixels,
@@ -202,9 +200,9 @@ pub fn draw(
     }
 }
 
-/// The coordinates of a span, linear or quadratic in each piece, pixel after pixel: the
-/// reference implementation of linear and quadratic pieces, which evaluates each polynomial from
-/// scratch for every pixel.
+/// The coordinates of a span, linear or quadratic in each piece, pixel after pixel: the reference
+/// implementation of linear and quadratic pieces, which evaluates each polynomial from scratch for every
+/// pixel.
 #[derive(Clone, Copy, Debug)]
 pub struct PolynomialStepper {
     cuts: Cuts,
@@ -256,7 +254,7 @@ impl PolynomialStepper {
         }
         let piece = self.cuts.next();
         let steps = i32::from(piece.steps.max(1));
-        let path = |from: i32, to: i32| [Path::straight(from, (to - from) / steps); 2];
+        let path = |from: i32, to: i32| [Path::linear(from, (to - from) / steps); 2];
         Quadratic {
             pixels: piece.pixels,
             second: piece.pixels,

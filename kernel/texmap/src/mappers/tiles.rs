@@ -1,28 +1,26 @@
 //! The tile mapper: the screen's grid cuts the polygon, and the mapping is affine inside each tile.
 //!
-//! Renderers of the time cut polygons into smaller ones and drew those affine. But new vertices
-//! would have to be snapped, and would move the frame's outline and seams. Here the screen's own
-//! grid cuts, every [`SIDE`] pixels, so coverage does not change. The quotient is computed at the
-//! corners of the tiles, which are centres of pixels and are shared by neighbouring tiles. A
-//! column's span is cut where it passes from one tile into the next. Its coordinates at the tile's
-//! top and bottom are interpolated between the corners, and the coordinates of its pixels between
-//! top and bottom. Every division by a length is a shift.
+//! Renderers of the time cut polygons into smaller polygons and drew these affine. But new vertices would
+//! have to be snapped, and would move the frame's outline and seams. Here the screen's own grid cuts, every
+//! [`SIDE`] pixels, so coverage does not change. The quotient is computed at the corners of the tiles, which
+//! are centres of pixels and are shared by neighbouring tiles. A column's span is cut where it passes from
+//! one tile into the next. Its coordinates at the tile's top and bottom are interpolated between the corners,
+//! and the coordinates of its pixels between top and bottom. Every division by a length is a shift.
 //!
-//! Corners outside the polygon still lie in its plane, and may lie outside the texture. They are
-//! not clamped, since that would bend the tile. The spans are clamped where they cross the border.
+//! Corners outside the polygon still lie in its plane, and may lie outside the texture. They are not clamped,
+//! since that would bend the tile. The spans are clamped where they cross the border.
 //!
 //! # Error
 //!
-//! Let u change by du between two places with the depth ratio r (at least 1). Linear interpolation
-//! between them is off by at most |du| (sqrt r - 1)/(sqrt r + 1). Along the top and the
-//! bottom of the tile, that bounds the error at the column's two ends, and a pixel between the ends
-//! gets a weighted mean of the two errors. Down the column the same formula applies once more, to
-//! the interpolation between the exact coordinates at these ends. So the bound is the larger of the
-//! errors of top and bottom, plus the column's own: a closed form, which is reached where the two
-//! have the same sign. Fixed point adds up to [`DRIFT`].
+//! Let u change by du between two places with the depth ratio r (at least 1). Linear interpolation between
+//! them is off by at most |du| (sqrt r - 1)/(sqrt r + 1). Along the top and the bottom of the tile, that
+//! bounds the error at the column's two ends, and a pixel between the ends gets a weighted mean of the two
+//! errors. Down the column the same formula applies once more, to the interpolation between the exact
+//! coordinates at these ends. So the bound is the larger of the errors of top and bottom, plus the column's
+//! own: a closed form, which is reached where the two have the same sign. Fixed point adds up to [`DRIFT`].
 //!
-//! If a tile has a corner on or beyond the horizon, or a corner further than 4096 texels away, or a
-//! corner [`MOST_DEPTH`] times as deep as another, its corners are not used: its spans are exact.
+//! If a tile has a corner on or beyond the horizon, or a corner further than 4096 texels away, or a corner
+//! [`MOST_DEPTH`] times as deep as another, its corners are not used: its spans are exact.
 
 use modex::{HEIGHT, WIDTH};
 
@@ -35,12 +33,11 @@ use crate::scan::spans;
 /// Length of a tile's side in pixels.
 pub const SIDE: u16 = 1 << BITS;
 const BITS: u32 = 4;
-/// Limit of the ratio between the depths of a tile's deepest and nearest corners. From this ratio
-/// on, linear interpolation is off by a third or more of the difference between them.
+/// Limit of the ratio between the depths of a tile's deepest and nearest corners. From this ratio on, linear
+/// interpolation is off by a third or more of the difference between them.
 pub const MOST_DEPTH: i64 = 4;
-/// Most that fixed point adds to the error, 16.16: the corner and the span's start are rounded
-/// down, 15 steps are rounded to nearest, and the reciprocal is off by 1/8 of a unit at the
-/// furthest corner.
+/// Most that fixed point adds to the error, 16.16: the corner and the span's start are rounded down, 15 steps
+/// are rounded to nearest, and the reciprocal is off by 1/8 of a unit at the furthest corner.
 pub const DRIFT: i32 = 10;
 
 /// Corners down the screen.
@@ -69,8 +66,7 @@ impl Grid {
         }
     }
 
-    /// Moves to another column of tiles. If it is the next column, the right corners become its
-    /// left corners.
+    /// Moves to another column of tiles. If it is the next column, the right corners become its left corners.
     fn go(&mut self, column: u16) {
         let [_, right] = self.sides;
         self.sides = match column == self.column + 1 {

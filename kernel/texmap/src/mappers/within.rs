@@ -1,9 +1,7 @@
-//! The mapper that stays within an error: the cheapest way to map each span that keeps to a
-//! tolerance.
+//! The mapper that stays within an error: the cheapest way to map each span that keeps to a tolerance.
 //!
-//! For every polygon, and then for every span, closed forms bound the error of each way to map it
-//! against the quotients. Of the ways that keep to the [`Tolerance`], the mapper uses the cheapest.
-//! From the cheapest on:
+//! For every polygon, and then for every span, closed forms bound the error of each way to map it against the
+//! quotients. Of the ways that keep to the [`Tolerance`], the mapper uses the cheapest. From the cheapest on:
 //!
 //! | way | cost | applies to |
 //! | --- | --- | --- |
@@ -14,47 +12,45 @@
 //!
 //! The quotients have error 0, so a way always exists.
 //!
-//! Quadratic pieces are not among the ways. A quadratic piece of 16 pixels costs more than 16
-//! quotients, and a piece of 32 pixels three quarters as much as 32 quotients, while lines of eight
-//! pixels cost a third. So a quadratic could help only where such lines err too much and such a
-//! curve does not, which is where the depth changes by less than a third over the curve. In random
-//! faces that is at most 1 % of the pixels for errors down to 1/16 texel, and 7 % for 1/256 texel
-//! (`tests/within.rs` prints the shares and checks them).
+//! Quadratic pieces are not among the ways. A quadratic piece of 16 pixels costs more than 16 quotients, and
+//! a piece of 32 pixels three quarters as much as 32 quotients, while lines of eight pixels cost a third. So
+//! a quadratic could help only where the error of such lines is too large and the error of such a curve is
+//! not, which is where the depth changes by less than a third over the curve. In random faces that is at most
+//! 1 % of the pixels for errors down to 1/16 texel, and 7 % for 1/256 texel (`tests/within.rs` prints the
+//! shares and checks them).
 //!
 //! # One affine map
 //!
-//! A face that is small, or hardly tilted, needs no quotient for its spans at all. Let f = n / c be
-//! a texture coordinate, where n is the form a or b. For any f0 and c0, the linear function
-//! A = f0 + (n - f0 c) / c0 differs from f by
+//! A face that is small, or hardly tilted, needs no quotient for its spans at all. Let f = n / c be a texture
+//! coordinate, where n is the form a or b. For any f0 and c0, the linear function A = f0 + (n - f0 c) / c0
+//! differs from f by
 //!
 //! ```text
 //! f - A = (A - f0) (c0 - c) / c
 //! ```
 //!
-//! exactly. Both factors of the numerator are linear, so over a polygon neither is larger in
-//! magnitude than at some corner, and c is nowhere less than at some corner. With f0 and c0 in the
-//! middle of the corners' values, the error is at most a quarter of the product of the changes of A
-//! and of c over the polygon, divided by the least c.
+//! exactly. Both factors of the numerator are linear, so over a polygon neither is larger in magnitude than
+//! at some corner, and c is nowhere less than at some corner. With f0 and c0 in the middle of the corners'
+//! values, the error is at most a quarter of the product of the changes of A and of c over the polygon,
+//! divided by the least c.
 //!
 //! # Lines
 //!
-//! All columns of a polygon have the same c', the change of c per pixel, and D is linear across the
-//! columns ([`crate::plane::bounds`] defines D and R). So an R computed from the larger |D| of the
-//! first and the last column serves all columns, and for most columns two multiplications then show
-//! that the column can be a line. Where they do not show it, or an end of the column is clamped,
-//! the column's own R decides.
+//! All columns of a polygon have the same c', the change of c per pixel, and D is linear across the columns
+//! ([`crate::plane::bounds`] defines D and R). So an R computed from the larger |D| of the first and the last
+//! column serves all columns, and for most columns two multiplications then show that the column can be a
+//! line. Where they do not show it, or an end of the column is clamped, the column's own R decides.
 //!
 //! # Columns or rows
 //!
-//! The depth of a floor changes fast down its columns and hardly along its rows, so lines are many
-//! times longer along rows. By the closed form, a line that keeps to a tolerance T is
-//! sqrt(4 T c^3 / |D c'|) pixels long, where c' is the change of c along the line. So at some
-//! places of the polygon the mapper computes the length and the cost of lines in both directions.
-//! The axis with the smaller total cost becomes the polygon's axis. The covered pixels do not
-//! depend on the axis ([`crate::scan`]).
+//! The depth of a floor changes fast down its columns and hardly along its rows, so lines are many times
+//! longer along rows. By the closed form, a line that keeps to a tolerance T is sqrt(4 T c^3 / |D c'|) pixels
+//! long, where c' is the change of c along the line. So at some places of the polygon the mapper computes the
+//! length and the cost of lines in both directions. The axis with the smaller total cost becomes the
+//! polygon's axis. The covered pixels do not depend on the axis ([`crate::scan`]).
 //!
-//! A pixel costs about the same in both directions. A piece of a row is made once in the order of
-//! the polygons and in RAM, but four times in the order of the planes. As a compromise it counts as
+//! A pixel costs about the same in both directions. A piece of a row is made once in the order of the
+//! polygons and in RAM, but four times in the order of the planes. As a compromise it counts as
 //! [`ROW`] pieces of a column. So rows are used where they gain much, and may still lose a little
 //! in the order of the planes. A mapper does not know the order, and no pixel depends on the order.
 
@@ -71,8 +67,7 @@ use modex::{HEIGHT, WIDTH};
 /// The assumed cost of making a piece of a row, in pieces of a column.
 pub const ROW: u32 = 2;
 
-/// The extent of a polygon: its bounding box on the screen, and the middle of its texture
-/// coordinates.
+/// The extent of a polygon: its bounding box on the screen, and the middle of its texture coordinates.
 #[derive(Clone, Copy, Debug)]
 struct Extent {
     /// The part on the screen, in 1/256 pixel: left, top, right, bottom.
@@ -106,8 +101,8 @@ impl Extent {
         })
     }
 
-    /// Passes corners that enclose the polygon's part on the screen to `sink`, relative to the
-    /// centre of pixel (0, 0), in 1/256 pixel: the polygon's own corners, or those of the box.
+    /// Passes corners that enclose the polygon's part on the screen to `sink`, relative to the centre of
+    /// pixel (0, 0), in 1/256 pixel: the polygon's own corners, or those of the box.
     #[inline(always)]
     fn corners(&self, polygon: &[Vertex], mut sink: impl FnMut(i64, i64)) {
         let mut corner = |x: i32, y: i32| sink((x - 128).into(), (y - 128).into());
@@ -131,8 +126,8 @@ impl Extent {
         [(first(left), first(top)), (last(right), last(bottom))]
     }
 
-    /// Returns the limits (near, far) of the polygon's inverse depths on the screen: no value of
-    /// the form c is above near or below far. Returns nothing unless both are above zero.
+    /// Returns the limits (near, far) of the polygon's inverse depths on the screen: no value of the form c
+    /// is above near or below far. Returns nothing unless both are above zero.
     #[inline]
     fn inverse_depths(&self, polygon: &[Vertex], c: &Form) -> Option<(i64, i64)> {
         let (mut near, mut far) = (i64::MIN, i64::MAX);
@@ -147,11 +142,10 @@ impl Extent {
     }
 }
 
-/// Bits to which the largest inverse depth is reduced for an affine map. That moves a coordinate by
-/// less than 3 units of 2^-16 texel anywhere on the screen: each coefficient is off by less than
-/// one, which counts for at most 560 pixels (width and height) and 256 texels, and the middle of
-/// the inverse depths is at least 2^32, so the coordinate moves by less than 256 x 560 / 2^32
-/// texel.
+/// Bits to which the largest inverse depth is reduced for an affine map. That moves a coordinate by less than
+/// 3 units of 2^-16 texel anywhere on the screen: each coefficient is off by less than one, which counts for
+/// at most 560 pixels (width and height) and 256 texels, and the middle of the inverse depths is at least
+/// 2^32, so the coordinate moves by less than 256 x 560 / 2^32 texel.
 const DEPTH_BITS: u32 = 34;
 
 /// Returns the affine map of a polygon, if the map keeps to `tolerance` everywhere in the polygon.
@@ -171,8 +165,7 @@ fn flat(
         ReciprocalAbove::new(Reciprocal::new(far)).relative_slope(((near - far) >> 1) + 1);
     let (mut off, mut inside) = (0, true);
     let mut gradient = |n: &Form, about: i32, last: i32| {
-        // Any f0 is correct. Clamp it, because the product with an illegal face's coordinate would
-        // not fit.
+        // Any f0 is correct. Clamp it, because the product with an illegal face's coordinate would not fit.
         let about = i64::from(about.clamp(0, last));
         let mut wide = 0;
         let mut slope = |n: i64, c: i64| {
@@ -183,8 +176,8 @@ fn flat(
         let right = slope(n.right, plane.c.right);
         let down = slope(n.down, plane.c.down);
         let origin = slope(n.origin, plane.c.origin);
-        // A flat face never has more than 2^8 texels per pixel (tested here) or 2^11 texels in all
-        // (tested in `gradient`).
+        // A flat face never has more than 2^8 texels per pixel (tested here) or 2^11 texels in all (tested in
+        // `gradient`).
         wide |= (right ^ right >> 63 | down ^ down >> 63) >> 40;
         if wide != 0 {
             return None;
@@ -249,8 +242,8 @@ pub struct Within {
 enum By {
     /// Columns of one affine map.
     Map(AffineMap),
-    /// Columns. The chords use the largest |D| of all columns, and the tolerance is reduced by one
-    /// unit for each pixel of the longest column.
+    /// Columns. The chords use the largest |D| of all columns, and the tolerance is reduced by one unit for
+    /// each pixel of the longest column.
     Columns(Option<Chords>),
     /// Rows.
     Rows,
@@ -312,8 +305,8 @@ impl Within {
             tolerance,
             by,
         } = self;
-        // A span that is at least as long as one that failed to be a line is not tried: neighbours
-        // are alike.
+        // A span that is at least as long as a span that failed to be a line is not tried: neighbours are
+        // alike.
         let mut too_long = u16::MAX;
         move |span| {
             let axis = match by {

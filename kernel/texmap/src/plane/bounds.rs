@@ -1,70 +1,67 @@
-//! Error bounds of the perspective approximations against the exact quotients: closed forms, in
-//! integers, rounded up.
+//! Error bounds of the perspective approximations against the exact quotients: closed forms, in integers,
+//! rounded up.
 //!
-//! Along a span, a texture coordinate is f = a / c, where a and c are linear in the pixel
-//! and change by a' and c' per pixel. (b / c is treated alike.) The slope of f is -D / c^2 with D =
-//! a c' - a' c, and D is the same at every pixel of the span. So one number, D, says how fast the
-//! texture coordinate changes, and c says how that speed varies. c is an inverse depth, so it is
-//! large near the eye: the worst error is always at the end where c is small, the far end.
+//! Along a span, a texture coordinate is f = a / c, where a and c are linear in the pixel and change by a'
+//! and c' per pixel. (b / c is treated alike.) The slope of f is -D / c^2 with D = a c' - a' c, and D is the
+//! same at every pixel of the span. So one number, D, says how fast the texture coordinate changes, and c
+//! says how that speed varies. c is an inverse depth, so it is large near the eye: the worst error is always
+//! at the end where c is small, the far end.
 //!
 //! # Linear
 //!
-//! Let a chord join exact values of f over n pixels, and let r be the ratio of the depths at its
-//! two ends. The worst error is |du| (sqrt r - 1) / (sqrt r + 1), where du is the change of f
-//! between the ends: f is 1 / c times a constant plus a constant, and the difference of 1 / c and
-//! its chord is largest where c is the geometric mean of the ends. Now let c be its value at the
-//! far end, p = |D| / c^2 the texels per pixel there, and x = n |c'| / c, so that r = 1 + x and
-//! |du| = p n / (1 + x). The error is
+//! Let a chord join exact values of f over n pixels, and let r be the ratio of the depths at its two ends.
+//! The worst error is |du| (sqrt r - 1) / (sqrt r + 1), where du is the change of f between the ends: f is
+//! 1 / c times a constant plus a constant, and the difference of 1 / c and its chord is largest where c is
+//! the geometric mean of the ends. Now let c be its value at the far end, p = |D| / c^2 the texels per pixel
+//! there, and x = n |c'| / c, so that r = 1 + x and |du| = p n / (1 + x). The error is
 //!
 //! ```text
 //! p n x / ((1 + x) (1 + sqrt(1 + x))^2)
 //! ```
 //!
-//! It falls as c grows. So of all pieces of a span the worst is a piece at the span's far end, and
-//! the bound of a span is that of its longest piece, placed at the far end.
+//! It falls as c grows. So of all pieces of a span the worst is a piece at the span's far end, and the bound
+//! of a span is that of its longest piece, placed at the far end.
 //!
 //! # Quadratic
 //!
 //! Through the two ends and the middle, the worst error is
-//! |du| r / (r - 1) max |(z - 1) (z - m) (z - r)| / (z m r) over z from 1 to r, where m = (1 + r)
-//! / 2. With z = 1 + s x that is
+//! |du| r / (r - 1) max |(z - 1) (z - m) (z - r)| / (z m r) over z from 1 to r, where m = (1 + r) / 2. With
+//! z = 1 + s x that is
 //!
 //! ```text
 //! p n x^2 max s (1/2 - s) (1 - s) / ((1 + s x) (1 + x / 2) (1 + x)),  s from 0 to 1/2
 //! ```
 //!
-//! (the other half of s has the same numerators and larger denominators). For small x this is close
-//! to p n x^2 / 20.8, and it is never above that. The familiar |du| ln(r)^2 / 20.8 is not a bound,
-//! because du is measured between the ends and p at the far end.
+//! (the other half of s has the same numerators and larger denominators). For small x this is close to
+//! p n x^2 / 20.8, and it is never above that. The familiar |du| ln(r)^2 / 20.8 is not a bound, because du is
+//! measured between the ends and p at the far end.
 //!
-//! Both formulas contain a factor that depends on x alone. These factors come from tables with 64
-//! parts below x = 1 and 16 parts in every power of two from there; each part holds the value at
-//! its lower end. The tables are too large by at most 3 % below 1, and above 1 by at most 13 %
-//! (linear) and 20 % (quadratic).
+//! Both formulas contain a factor that depends on x alone. These factors come from tables with 64 parts below
+//! x = 1 and 16 parts in every power of two from there; each part holds the value at its lower end. The
+//! tables are too large by at most 3 % below 1, and above 1 by at most 13 % (linear) and 20 % (quadratic).
 //!
 //! # Chords of any length
 //!
 //! With c and d the values of the form c at a chord's two ends, the linear error is
-//! |D c'| n^2 / (c d (sqrt c + sqrt d)^2). A sum is at least twice the geometric mean, so the error
-//! is never above
+//! |D c'| n^2 / (c d (sqrt c + sqrt d)^2). A sum is at least twice the geometric mean, so the error is never
+//! above
 //!
 //! ```text
 //! |D c'| n^2 / (4 (c d)^(3/2))
 //! ```
 //!
-//! which is too large by 3 % where c is twice d. It is at most a tolerance T where the geometric
-//! mean sqrt(c d) is at least R n^(2/3), with R^3 = |D c'| / (4 T). R is one number for a whole
-//! span, or for many spans, and gives the permitted length of a chord at every place (`Chords`).
+//! which is too large by 3 % where c is twice d. It is at most a tolerance T where the geometric mean
+//! sqrt(c d) is at least R n^(2/3), with R^3 = |D c'| / (4 T). R is one number for a whole span, or for many
+//! spans, and gives the permitted length of a chord at every place (`Chords`).
 //!
 //! # What is rounded, and what is clamped
 //!
-//! Rounding down moves a quotient by less than 1 + 3/128 units of 2^-16 texel, and a linear step by
-//! less than one unit for every pixel. Ends outside the texture are clamped. Clamping a monotone f
-//! at a level moves a chord by at most the amount clamped at its ends, and a quadratic by at most
-//! 5/4 of that, the largest sum of the magnitudes of its three weights. Nor can the error exceed
-//! the coordinate's change over the whole span, because the coordinate and its approximation are
-//! both monotone in every piece. On and beyond the horizon that argument fails, and the bound is
-//! the size of the texture.
+//! Rounding down moves a quotient by less than 1 + 3/128 units of 2^-16 texel, and a linear step by less than
+//! one unit for every pixel. Ends outside the texture are clamped. Clamping a monotone f at a level moves a
+//! chord by at most the amount clamped at its ends, and a quadratic by at most 5/4 of that, the largest sum
+//! of the magnitudes of its three weights. Nor can the error exceed the coordinate's change over the whole
+//! span, because the coordinate and its approximation are both monotone in every piece. On and beyond the
+//! horizon that argument fails, and the bound is the size of the texture.
 
 use super::reciprocal::{
     MAX_SLOPE, Reciprocal, ReciprocalAbove, quotients_and_excess, quotients_by,
@@ -78,8 +75,8 @@ const FINE: usize = 64;
 /// Powers of two above x = 1, with 16 parts each.
 const OCTAVES: usize = 13;
 const PARTS: usize = FINE + 16 * OCTAVES;
-/// End of the tables: the first x without a part, 32 fraction bits. One piece has a depth ratio of
-/// 8193 there.
+/// End of the tables: the first x without a part, 32 fraction bits. One piece has a depth ratio of 8193
+/// there.
 const END: u64 = 1 << (32 + OCTAVES);
 const _: () = assert!(END == MAX_SLOPE);
 
@@ -116,15 +113,15 @@ const LINEAR: [u64; PARTS] = {
     table
 };
 
-/// The maximum over s of s (1/2 - s) (1 - s) / ((1 + s x) (1 + x / 2) (1 + x)) for each part, 60
-/// fraction bits, rounded up.
+/// The maximum over s of s (1/2 - s) (1 - s) / ((1 + s x) (1 + x / 2) (1 + x)) for each part, 60 fraction
+/// bits, rounded up.
 const QUADRATIC: [u64; PARTS] = {
     let mut table = [0; PARTS];
     let mut part = 0;
     while part < PARTS {
         let x = lower_end(part) as u128;
-        // The search narrows s to 2^-19, about two millionths. The function is flat around its
-        // maximum, so this misses less than 2^-38 of it; adding 2^-36 of it makes up for that.
+        // The search narrows s to 2^-19, about two millionths. The function is flat around its maximum, so
+        // this misses less than 2^-38 of it; adding 2^-36 of it makes up for that.
         let (mut low, mut high) = (0, 1 << 19);
         while high - low > 2 {
             let third = (high - low) / 3;
@@ -150,12 +147,11 @@ const fn lobe(s: u128, x: u128) -> u128 {
 /// The error bound of a span: the quantities that the closed forms depend on.
 #[derive(Clone, Copy, Debug)]
 pub struct SpanBound {
-    /// Coordinates at the span's two ends, as [`quotients`](super::reciprocal::quotients) returns
-    /// them.
+    /// Coordinates at the span's two ends, as [`quotients`](super::reciprocal::quotients) returns them.
     pub ends: [(i32, i32); 2],
     steps: u16,
-    /// p: the change of the faster coordinate at the far end, in texels per pixel; 32 fraction
-    /// bits, rounded up.
+    /// p: the change of the faster coordinate at the far end, in texels per pixel; 32 fraction bits, rounded
+    /// up.
     texel_step: u64,
     /// |c'| / c at the far end: the relative change of c per pixel; 32 fraction bits, rounded up.
     relative_slope: u64,
@@ -201,8 +197,7 @@ impl SpanBound {
         bound
     }
 
-    /// Returns a bound of a coordinate's error with linear [`Subdivision`], in units of 2^-16
-    /// texel.
+    /// Returns a bound of a coordinate's error with linear [`Subdivision`], in units of 2^-16 texel.
     pub fn linear(&self, pieces: Subdivision) -> u32 {
         let steps = pieces.longest(self.steps);
         let error = self.chord(2 * u64::from(steps));
@@ -210,14 +205,13 @@ impl SpanBound {
         error.min(self.most.into()) as u32
     }
 
-    /// Returns a bound of a coordinate's error with quadratic [`Subdivision`], in units of 2^-16
-    /// texel.
+    /// Returns a bound of a coordinate's error with quadratic [`Subdivision`], in units of 2^-16 texel.
     ///
     /// A piece that turns is drawn as two chords, so this bound covers them too (see
     /// [`crate::mappers::quadratic`] for turning pieces, d and K). Where the depth ratio of the
-    /// longest piece is below 5/2, |K| is at most 6/7 |d|. Then only the rounding of the three
-    /// quotients can make a piece turn, and only when |d| is below 36 units; the two halves then
-    /// are off by at most 2 units more.
+    /// longest piece is below 5/2, |K| is at most 6/7 |d|. Then only the rounding of the three quotients can
+    /// make a piece turn, and only when |d| is below 36 units; the two halves then are off by at most 2 units
+    /// more.
     pub fn quadratic(&self, pieces: Subdivision) -> u32 {
         let steps = u64::from(pieces.longest(self.steps));
         let mut error = self.curve(steps);
@@ -233,12 +227,11 @@ impl SpanBound {
         self.steps
     }
 
-    /// Returns a lower bound of the error of a single chord over the whole span, not counting fixed
-    /// point. A chord over n of the span's steps at the far end has at least n^2 / steps^2 of this
-    /// error.
+    /// Returns a lower bound of the error of a single chord over the whole span, not counting fixed point. A
+    /// chord over n of the span's steps at the far end has at least n^2 / steps^2 of this error.
     ///
-    /// That follows because p n x / (...) is n^2 times a falling function of n. The table is too
-    /// large by at most 13 %, which the factor 7/8 removes.
+    /// That follows because p n x / (...) is n^2 times a falling function of n. The table is too large by at
+    /// most 13 %, which the factor 7/8 removes.
     pub(crate) fn chord_at_least(&self) -> u64 {
         (self.chord(2 * u64::from(self.steps)) / 8 * 7).saturating_sub(2)
     }
@@ -257,8 +250,7 @@ impl SpanBound {
         })
     }
 
-    /// Returns p n times a factor of x that has 40 fraction bits, in units of 2^-16 texel, rounded
-    /// up.
+    /// Returns p n times a factor of x that has 40 fraction bits, in units of 2^-16 texel, rounded up.
     fn times(&self, halves: u64, x: u64, factor: impl Fn(u128, usize) -> u128) -> u64 {
         if x >= END {
             return u32::MAX.into();
@@ -274,12 +266,11 @@ impl SpanBound {
 /// Longest chord in steps: a row of the screen.
 const LONGEST: usize = modex::WIDTH - 1;
 
-/// The inverse depths at which a chord keeps to a tolerance, for every length of the chord. They
-/// are values of the form c.
+/// The inverse depths at which a chord keeps to a tolerance, for every length of the chord. They are values
+/// of the form c.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chords {
-    /// R, rounded up: 8 fraction bits, below 2^42, in units of 2^`shift` as all inverse depths
-    /// here.
+    /// R, rounded up: 8 fraction bits, below 2^42, in units of 2^`shift` as all inverse depths here.
     root: u64,
     /// Bits that are cut off inverse depths, so that the largest has at most 32 bits.
     shift: u32,
@@ -288,9 +279,9 @@ pub(crate) struct Chords {
 }
 
 impl Chords {
-    /// Returns the permitted chords of spans along `steppers`, which share one c', for an error of
-    /// at most `tolerance` units of 2^-16 texel. `near` is the largest inverse depth of any later
-    /// query, and is above zero.
+    /// Returns the permitted chords of spans along `steppers`, which share one c', for an error of at most
+    /// `tolerance` units of 2^-16 texel. `near` is the largest inverse depth of any later query, and is above
+    /// zero.
     #[inline]
     pub fn new(steppers: &[PlaneStepper], near: i64, tolerance: u32) -> Self {
         let shift = 32u32.saturating_sub(near.leading_zeros());
@@ -311,8 +302,8 @@ impl Chords {
             let root = if most == 0 { 1 << 40 } else { 0 };
             return Self { root, shift, most };
         }
-        // In these units R^3 is |D c'| 2^14 / T. Make it a number of 61 to 63 bits whose exponent
-        // is a multiple of three.
+        // In these units R^3 is |D c'| 2^14 / T. Make it a number of 61 to 63 bits whose exponent is a
+        // multiple of three.
         let zeros = product.leading_zeros();
         let over = (product << zeros) / u64::from(most) + 1;
         let more_zeros = over.leading_zeros();
@@ -332,8 +323,8 @@ impl Chords {
         (c >> self.shift) as u64
     }
 
-    /// Returns R n^(2/3) for n = `pixels`, rounded up: the least geometric mean of the inverse
-    /// depths at a chord's ends.
+    /// Returns R n^(2/3) for n = `pixels`, rounded up: the least geometric mean of the inverse depths at a
+    /// chord's ends.
     #[inline]
     fn mean(&self, pixels: u16) -> u64 {
         ((self.root * POWERS[usize::from(pixels)]) >> 24) + u64::from(self.root > 0)
@@ -345,8 +336,8 @@ impl Chords {
         self.mean(pixels) > near
     }
 
-    /// Returns whether a chord may span the whole of `pixels` pixels along `stepper`. The test
-    /// leaves no room for the rounding of the steps or for clamped ends; [`Chords::least`] does.
+    /// Returns whether a chord may span the whole of `pixels` pixels along `stepper`. The test leaves no room
+    /// for the rounding of the steps or for clamped ends; [`Chords::least`] does.
     #[inline]
     pub fn keep(&self, stepper: &PlaneStepper, pixels: u16) -> bool {
         let (from, to) = (stepper.at[2], stepper.after(pixels)[2]);
@@ -355,9 +346,9 @@ impl Chords {
         is_legal && mean >> 32 == 0 && self.cut(from) * self.cut(to) >= mean * mean
     }
 
-    /// Returns the least product of the inverse depths at the ends of a chord over `pixels` pixels,
-    /// where the ends are clamped by up to `outside` units. Returns [`u64::MAX`], which no product
-    /// reaches, if no inverse depths suffice.
+    /// Returns the least product of the inverse depths at the ends of a chord over `pixels` pixels, where the
+    /// ends are clamped by up to `outside` units. Returns [`u64::MAX`], which no product reaches, if no
+    /// inverse depths suffice.
     #[inline]
     pub fn least(&self, pixels: u16, outside: u32) -> u64 {
         let spent = u64::from(pixels) + u64::from(outside);
@@ -398,8 +389,8 @@ const fn root_by_bits(n: u128) -> u64 {
     root + 1
 }
 
-/// Returns an upper bound of the cube root of every number below n + 1, for `n` from 2^60 to
-/// 2^63 - 1; too large by at most one part in 2000.
+/// Returns an upper bound of the cube root of every number below n + 1, for `n` from 2^60 to 2^63 - 1; too
+/// large by at most one part in 2000.
 #[inline]
 fn cube_root(n: u64) -> u64 {
     const GUESSES: [u32; 64] = {
@@ -412,8 +403,7 @@ fn cube_root(n: u64) -> u64 {
         }
         guesses
     };
-    // A Newton step from either side ends at or above the root, except for what the two divisions
-    // cut off.
+    // A Newton step from either side ends at or above the root, except for what the two divisions cut off.
     let guess = u64::from(GUESSES[(n >> 57) as usize & 63]);
     (2 * guess + n / (guess * guess)) / 3 + 2
 }

@@ -1,32 +1,32 @@
 //! The perspective plane: a texture's plane in space, as three linear forms of the screen.
 //!
-//! A polygon's texture lies in the plane P + u M + v N of the viewer's space, where P is the
-//! texture's origin and M and N are its axes. The ray through a pixel is t d with d = (i, j, f):
-//! (i, j) is the pixel's position relative to the middle of the screen, and f is the focal length.
-//! The ray meets the plane where t d = P + u M + v N. Eliminating two unknowns at a time gives
+//! A polygon's texture lies in the plane P + u M + v N of the viewer's space, where P is the texture's origin
+//! and M and N are its axes. The ray through a pixel is t d with d = (i, j, f): (i, j) is the pixel's
+//! position relative to the middle of the screen, and f is the focal length. The ray meets the plane where
+//! t d = P + u M + v N. Eliminating two unknowns at a time gives
 //!
 //! ```text
 //! u = a / c    v = b / c    a = d . (N x P)    b = d . (P x M)    c = d . (M x N)
 //! ```
 //!
-//! The three forms a, b and c are linear in i and j. They can be computed without P, M and N. Take
-//! three points V of the plane with their texture coordinates, and for each point V let
-//! L = d . (V' x V''), where V' and V'' are the two points that follow V in cyclic order. L is
-//! proportional to the weight of V at the point where the ray meets the plane, so
+//! The three forms a, b and c are linear in i and j. They can be computed without P, M and N. Take three
+//! points V of the plane with their texture coordinates, and for each point V let L = d . (V' x V''), where
+//! V' and V'' are the two points that follow V in cyclic order. L is proportional to the weight of V at the
+//! point where the ray meets the plane, so
 //!
 //! ```text
 //! a = sum of u L    b = sum of v L    c = sum of L
 //! ```
 //!
-//! are the same three forms up to a common factor, which cancels in the quotients. These sums need
-//! no division, and texture axes in special directions need no special case.
+//! are the same three forms up to a common factor, which cancels in the quotients. These sums need no
+//! division, and texture axes in special directions need no special case.
 //!
 //! # The integers
 //!
 //! The sums are exact: below 2^92 for points within [`MAX_POSITION`]. One shift, common to all nine
-//! coefficients, then reduces them to 61 bits, and each coefficient is rounded to nearest (half
-//! up). That moves a form's value by at most [`ROUNDING`]. Nothing is rounded after that: the texel
-//! *is* the floor of the quotient of those integers.
+//! coefficients, then reduces them to 61 bits, and each coefficient is rounded to nearest (half up). That
+//! moves a form's value by at most [`ROUNDING`]. Nothing is rounded after that: the texel *is* the floor of
+//! the quotient of those integers.
 
 use modex::{HEIGHT, WIDTH};
 
@@ -34,12 +34,12 @@ use modex::{HEIGHT, WIDTH};
 pub const MAX_POSITION: i32 = 1 << 24;
 /// Largest focal length in pixels.
 pub const MAX_FOCAL_LENGTH: i32 = 1 << 15;
-/// Most that rounding the coefficients moves a form's value, in units of its last place: half a
-/// unit for the origin, and half a unit for each step to the right and down.
+/// Most that rounding the coefficients moves a form's value, in units of its last place: half a unit for the
+/// origin, and half a unit for each step to the right and down.
 pub const ROUNDING: i64 = (WIDTH + HEIGHT).div_ceil(2) as i64;
 
-/// Bits of a form's value on the screen. [`texel`] compares one value with 256 times another, and
-/// the difference of the two fits 63 bits.
+/// Bits of a form's value on the screen. [`texel`] compares one value with 256 times another, and the
+/// difference of the two fits 63 bits.
 const BITS: u32 = 61;
 
 /// A point of the plane and its texture coordinates.
@@ -83,21 +83,20 @@ pub struct Plane {
     pub c: Form,
 }
 
-/// A form before it is reduced to [`BITS`]: its value at pixel (0, 0), and its steps to the right
-/// and down.
+/// A form before it is reduced to [`BITS`]: its value at pixel (0, 0), and its steps to the right and down.
 pub(crate) type WideForm = [i128; 3];
 
 impl Plane {
     /// Returns the plane through three points.
     ///
-    /// Three points on a line, or a plane through the eye, also yield forms. [`texel`] then decides
-    /// what such a polygon shows, as it does everywhere.
+    /// Three points on a line, or a plane through the eye, also yield forms. [`texel`] then decides what such
+    /// a polygon shows, as it does everywhere.
     ///
     /// # Panics
     /// In a build with overflow checks, if a position or the focal length is out of its range.
     pub fn new(anchors: &[Anchor; 3], focal_length: i32) -> Self {
-        // Positions have 24 bits and the cross products of two positions have 50: only the sums of
-        // products below need more than 64.
+        // Positions have 24 bits and the cross products of two positions have 50: only the sums of products
+        // below need more than 64.
         let [v0, v1, v2] = anchors.map(|anchor| anchor.position.map(i64::from));
         let mut weights = [cross(v1, v2), cross(v2, v0), cross(v0, v1)];
         // The sign of this volume is the sign of c in front of the eye.
@@ -132,8 +131,8 @@ impl Plane {
 
 /// Returns the texel index of the coordinate n / c: its floor, in a texture of `size` texels.
 ///
-/// Outside the texture, returns the nearest texel. On and beyond the horizon, where c is not above
-/// zero, returns the texel that the last pixels before the horizon approach.
+/// Outside the texture, returns the nearest texel. On and beyond the horizon, where c is not above zero,
+/// returns the texel that the last pixels before the horizon approach.
 ///
 /// `size` is at most 256, and `n` and `c` are values of a [`Plane`]'s forms on the screen.
 pub fn texel(n: i64, c: i64, size: u16) -> u16 {
@@ -147,8 +146,8 @@ pub fn texel(n: i64, c: i64, size: u16) -> u16 {
     }
 }
 
-/// Returns the coordinate n / c in a texture of `size` texels: 16.16, rounded down, and clamped
-/// into the texture as in [`texel`].
+/// Returns the coordinate n / c in a texture of `size` texels: 16.16, rounded down, and clamped into the
+/// texture as in [`texel`].
 pub fn coordinate(n: i64, c: i64, size: u16) -> i32 {
     let last = (i64::from(size) << 16) - 1;
     if n < 0 {
@@ -173,9 +172,9 @@ fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
     ]
 }
 
-/// Returns `vector . d` as a form. The centre of pixel (x, y) is at (x + 1/2, y + 1/2), and the
-/// middle of the screen is the corner between four pixels, so i and j are odd multiples of 1/2. The
-/// form is doubled to keep it whole.
+/// Returns `vector . d` as a form. The centre of pixel (x, y) is at (x + 1/2, y + 1/2), and the middle of the
+/// screen is the corner between four pixels, so i and j are odd multiples of 1/2. The form is doubled to keep
+/// it whole.
 #[inline(always)]
 pub(crate) fn on_screen(vector: [i128; 3], focal_length: i32) -> WideForm {
     let [i, j, k] = vector;
@@ -187,8 +186,8 @@ pub(crate) fn on_screen(vector: [i128; 3], focal_length: i32) -> WideForm {
     ]
 }
 
-/// Returns twice the largest magnitude of `vector . d` on the screen, which a corner pixel reaches:
-/// the magnitude at the middle plus the magnitudes of the changes from there to the last centres.
+/// Returns twice the largest magnitude of `vector . d` on the screen, which a corner pixel reaches: the
+/// magnitude at the middle plus the magnitudes of the changes from there to the last centres.
 #[inline(always)]
 fn largest([i, j, k]: [i128; 3], focal_length: i32) -> u128 {
     let middle = 2 * i128::from(focal_length) * k;
@@ -196,8 +195,8 @@ fn largest([i, j, k]: [i128; 3], focal_length: i32) -> u128 {
     middle.unsigned_abs() + right.unsigned_abs() + down.unsigned_abs()
 }
 
-/// Returns `n / 2^shift`, rounded to nearest, half up. `shift` is below 64; `shift % 64` lets the
-/// compiler rely on that.
+/// Returns `n / 2^shift`, rounded to nearest, half up. `shift` is below 64; `shift % 64` lets the compiler
+/// rely on that.
 #[inline(always)]
 fn cut(n: i128, shift: u32) -> i64 {
     let half = (1u64 << shift) >> 1;

@@ -1,12 +1,11 @@
 //! Reciprocals of inverse depths: one division for both coordinates of a pixel.
 //!
 //! [`Reciprocal`] needs one division for the two coordinates of a place. A coordinate is off by
-//! less than 2^-16 (1 + 3/128) texel, and never above the quotient. A quotient outside the texture
-//! is clamped into it. On and beyond the horizon, where c is not above zero, no division happens,
-//! and the coordinate is that of [`coordinate`](super::forms::coordinate).
+//! less than 2^-16 (1 + 3/128) texel, and never above the quotient. A quotient outside the texture is clamped
+//! into it. On and beyond the horizon, where c is not above zero, no division happens, and the coordinate is
+//! that of [`coordinate`](super::forms::coordinate).
 
-/// 1 / c for c above zero, to 31 bits. c is a form's value, which is proportional to the inverse
-/// depth 1 / z.
+/// 1 / c for c above zero, to 31 bits. c is a form's value, which is proportional to the inverse depth 1 / z.
 #[derive(Clone, Copy, Debug)]
 pub struct Reciprocal {
     /// Leading zeros of c: 64 less its bits.
@@ -16,9 +15,9 @@ pub struct Reciprocal {
 }
 
 impl Reciprocal {
-    /// Returns the reciprocal of `c`, 1 to 2^55, never above 1 / c: 2^63 / (h + 1), rounded down,
-    /// where h is the highest 32 bits of c. `c` is a value of a form of a [`crate::Plane`] on the
-    /// screen, or the sum of two.
+    /// Returns the reciprocal of `c`, 1 to 2^55, never above 1 / c: 2^63 / (h + 1), rounded down, where h is
+    /// the highest 32 bits of c. `c` is a value of a form of a [`crate::Plane`] on the screen, or the sum of
+    /// two.
     #[inline]
     pub fn new(c: i64) -> Self {
         let zeros = c.leading_zeros();
@@ -29,8 +28,8 @@ impl Reciprocal {
         }
     }
 
-    /// Returns the reciprocal of `c` as 2^63 / h, rounded down: off by less than 2^-31 of its value
-    /// in either direction. Returns nothing unless `c` is above zero.
+    /// Returns the reciprocal of `c` as 2^63 / h, rounded down: off by less than 2^-31 of its value in either
+    /// direction. Returns nothing unless `c` is above zero.
     pub(crate) fn unbiased(c: i64) -> Option<Self> {
         if c <= 0 {
             return None;
@@ -43,8 +42,8 @@ impl Reciprocal {
         })
     }
 
-    /// Returns n / c with 16 more fraction bits than `n` has, for c of 16 to 48 bits. The result is
-    /// off by 2^-31 of its value, and is rounded down.
+    /// Returns n / c with 16 more fraction bits than `n` has, for c of 16 to 48 bits. The result is off by
+    /// 2^-31 of its value, and is rounded down.
     #[inline]
     pub(crate) fn times_signed(self, n: i64) -> i64 {
         // `% 64` lets the compiler rely on a shift below 64.
@@ -62,14 +61,14 @@ impl Reciprocal {
         (i128::from(n) * i128::from(self.value) + (1 << (shift - 1))) >> shift
     }
 
-    /// Returns n / c in 16.16 for 0 <= n < 256 c: at most the quotient, and less than 1 + 3/128
-    /// units below it.
+    /// Returns n / c in 16.16 for 0 <= n < 256 c: at most the quotient, and less than 1 + 3/128 units below
+    /// it.
     ///
-    /// For a reciprocal of [`Reciprocal::new`]. With c' = c 2^zeros / 2^32 and n' = n 2^zeros /
-    /// 2^40, the quotient is 2^24 n' / c', and n' < c'. Three values are rounded down, and each
-    /// rounding costs less than 2^-7 units: n' to a whole number (value / 2^39), 1 / c' to at least
-    /// 1 / (c' + 1) (2^24 / c'), and the reciprocal to a whole number (n' / 2^39). Cutting off the
-    /// fraction of the result then costs less than one unit.
+    /// For a reciprocal of [`Reciprocal::new`]. With c' = c 2^zeros / 2^32 and n' = n 2^zeros / 2^40, the
+    /// quotient is 2^24 n' / c', and n' < c'. Three values are rounded down, and each rounding costs less
+    /// than 2^-7 units: n' to a whole number (value / 2^39), 1 / c' to at least 1 / (c' + 1) (2^24 / c'), and
+    /// the reciprocal to a whole number (n' / 2^39). Cutting off the fraction of the result then costs less
+    /// than one unit.
     #[inline]
     pub fn times(self, n: i64) -> i32 {
         let high = (n as u64) << (self.zeros - 8) >> 32;
@@ -77,8 +76,8 @@ impl Reciprocal {
     }
 }
 
-/// A [`Reciprocal`] of a c from [`LargeReciprocal::LEAST`] on, with the same results bit for bit.
-/// It needs one shift where [`Reciprocal`] needs two.
+/// A [`Reciprocal`] of a c from [`LargeReciprocal::LEAST`] on, with the same results bit for bit. It needs
+/// one shift where [`Reciprocal`] needs two.
 #[derive(Clone, Copy)]
 pub(crate) struct LargeReciprocal {
     /// Number of bits of c above 24.
@@ -107,8 +106,8 @@ impl LargeReciprocal {
     }
 }
 
-/// Returns the coordinates where the three forms have the values `forms`, clamped into a texture
-/// whose last coordinates are `last`.
+/// Returns the coordinates where the three forms have the values `forms`, clamped into a texture whose last
+/// coordinates are `last`.
 ///
 /// They are off by less than 1 + 3/128 units of 2^-16 texel, and never above the quotients.
 #[inline]
@@ -135,8 +134,8 @@ pub(crate) fn quotients_by(
     (quotient(a, last.0), quotient(b, last.1))
 }
 
-/// Returns the coordinates of [`quotients_by`], and how far the quotients lie outside the texture:
-/// in units of 2^-16 texel, rounded up, at most 256 texels. c must be above zero.
+/// Returns the coordinates of [`quotients_by`], and how far the quotients lie outside the texture: in units
+/// of 2^-16 texel, rounded up, at most 256 texels. c must be above zero.
 #[inline]
 pub(crate) fn quotients_and_excess(
     reciprocal: Reciprocal,
@@ -169,8 +168,7 @@ pub(crate) const MAX_SLOPE: u64 = 1 << 45;
 pub(crate) struct ReciprocalAbove {
     /// Leading zeros of c: 64 less its bits.
     zeros: u32,
-    /// 1 / c <= inverse 2^(zeros - 95), and the right side is too large by less than one part in
-    /// 2^29.
+    /// 1 / c <= inverse 2^(zeros - 95), and the right side is too large by less than one part in 2^29.
     inverse: u64,
 }
 
@@ -191,15 +189,15 @@ impl ReciprocalAbove {
         ((product >> (63 - self.zeros)) + 1).min(MAX_SLOPE.into()) as u64
     }
 
-    /// Returns |D| / c^2, 32 fraction bits, rounded up: too large by one part in 2^28 plus one or
-    /// two units in the last place.
+    /// Returns |D| / c^2, 32 fraction bits, rounded up: too large by one part in 2^28 plus one or two units
+    /// in the last place.
     pub(crate) fn texel_step(&self, d: u128) -> u64 {
         // |D| <= d 2^excess, and 1 / c^2 <= square 2^(2 zeros - 158).
         let excess = (128 - d.leading_zeros()).saturating_sub(63);
         let d = (d >> excess) + u128::from(excess > 0);
         let square = (u128::from(self.inverse) * u128::from(self.inverse)).div_ceil(1 << 32);
-        // Below 2^97. A negative `bits` needs `excess` above zero, so d is at least 2^62 and the
-        // product is above 2^91: shifted up, it does not fit 64 bits.
+        // Below 2^97. A negative `bits` needs `excess` above zero, so d is at least 2^62 and the product is
+        // above 2^91: shifted up, it does not fit 64 bits.
         let product = d * square;
         let bits = 126 - 2 * i64::from(self.zeros) - i64::from(excess);
         match bits {
@@ -245,8 +243,7 @@ mod tests {
             let n = random.i128(-i128::from(c)..=c.into()) * i128::from(texels);
             let n = n.clamp(-(1 << 62), 1 << 62) as i64;
             let over = Reciprocal::unbiased(c).unwrap();
-            // In eighths of a unit in the last place: rounding down or to nearest, plus an eighth
-            // of error.
+            // In eighths of a unit in the last place: rounding down or to nearest, plus an eighth of error.
             let (eight, c) = (i128::from(n) << 19, i128::from(c));
             let off = |at: i128| 8 * at * c - eight;
             assert!((-9 * c..=c).contains(&off(over.floor(n))), "{n} / {c}");

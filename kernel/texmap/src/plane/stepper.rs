@@ -38,8 +38,7 @@ impl PlaneStepper {
         [0, 1, 2].map(|k| self.at[k] + self.step[k] * i64::from(pixels))
     }
 
-    /// Returns the stepper that starts at pixel `pixels` of this stepper and steps by `stride`
-    /// pixels.
+    /// Returns the stepper that starts at pixel `pixels` of this stepper and steps by `stride` pixels.
     pub(crate) fn every(&self, stride: u16, pixels: u16) -> Self {
         Self {
             at: self.after(pixels),

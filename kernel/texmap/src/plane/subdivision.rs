@@ -8,8 +8,8 @@ pub(crate) const LONGEST_POWER: u16 = 64;
 pub enum Subdivision {
     /// Pieces of the given number of steps, 2 to 128, and a last piece of the steps left over.
     Of(u8),
-    /// Powers of two that add up to the span's steps, at most 64 each, the longest first. Every
-    /// division by a piece's length is a shift.
+    /// Powers of two that add up to the span's steps, at most 64 each, the longest first. Every division by a
+    /// piece's length is a shift.
     Powers,
     /// A single piece: the whole span.
     Whole,

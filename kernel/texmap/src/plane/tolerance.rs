@@ -7,8 +7,8 @@ use core::fmt;
 pub struct Tolerance(u32);
 
 impl Tolerance {
-    /// Returns the fraction of a texel, rounded down to 2^-16, or nothing if it is below 2^-16 or
-    /// above 256 texels.
+    /// Returns the fraction of a texel, rounded down to 2^-16, or nothing if it is below 2^-16 or above 256
+    /// texels.
     pub const fn new(numerator: u32, denominator: u32) -> Option<Self> {
         if denominator == 0 {
             return None;

@@ -2,37 +2,35 @@
 //!
 //! # The rule
 //!
-//! A pixel with centre (xc, yc) is inside when an odd number of edges have `ymin <= yc < ymax` and
-//! cross `yc` at `x <= xc`. The rule is half-open and even-odd, and is decided in exact integers.
-//! It speaks of rows, so [`rows`] applies it as it stands: the first pixel to the right of an edge
-//! is the first with `xc >= x(yc)`, and the pixels between an odd crossing and the next even
-//! crossing are inside.
+//! A pixel with centre (xc, yc) is inside when an odd number of edges have `ymin <= yc < ymax` and cross `yc`
+//! at `x <= xc`. The rule is half-open and even-odd, and is decided in exact integers. It speaks of rows, so
+//! [`rows`] applies it as it stands: the first pixel to the right of an edge is the first with `xc >= x(yc)`,
+//! and the pixels between an odd crossing and the next even crossing are inside.
 //!
 //! [`columns`] needs the same rule in terms of columns. Restate the rule first: move the centre to
-//! the right by an infinitesimal e, and down by a d that is infinitesimal even compared with e.
-//! Then no edge ever passes exactly through a centre, and the plain even-odd test decides. (The
-//! move to the right turns `x <= xc` into `x < xc + e`. The move down turns the half-open interval
-//! into an open one. Because d is so small compared with e, the slope of the edge does not disturb
-//! the first comparison.)
+//! the right by an infinitesimal e, and down by a d that is infinitesimal even compared with e. Then no edge
+//! ever passes exactly through a centre, and the plain even-odd test decides. (The move to the right turns
+//! `x <= xc` into `x < xc + e`. The move down turns the half-open interval into an open one. Because d is so
+//! small compared with e, the slope of the edge does not disturb the first comparison.)
 //!
-//! In this form the test also works down a column. The column at xc + e meets exactly the edges
-//! with `xmin <= xc < xmax`, so it never meets a vertical edge. It meets each of them at
-//! y(xc) + e dy/dx. A centre at yc + d lies below that crossing when yc > y(xc). When yc = y(xc),
-//! it does so only if dy/dx <= 0: if the slope is positive, the crossing lies e dy/dx further down,
-//! which is more than d. So the first row below an edge is
+//! In this form the test also works down a column. The column at xc + e meets exactly the edges with
+//! `xmin <= xc < xmax`, so it never meets a vertical edge. It meets each of them at y(xc) + e dy/dx. A centre
+//! at yc + d lies below that crossing when yc > y(xc). When yc = y(xc), it does so only if dy/dx <= 0: if the
+//! slope is positive, the crossing lies e dy/dx further down, which is more than d. So the first row below an
+//! edge is
 //!
 //! - the first with `yc >= y(xc)` if dy <= 0,
 //! - the first with `yc > y(xc)` if dy > 0,
 //!
-//! and the rows between an odd crossing and the next even crossing are inside. If every edge used
-//! `>=`, columns would draw the transposed rule: on ties they would draw other pixels than rows do,
-//! and leave gaps where the two meet.
+//! and the rows between an odd crossing and the next even crossing are inside. If every edge used `>=`,
+//! columns would draw the transposed rule: on ties they would draw other pixels than rows do, and leave gaps
+//! where the two meet.
 //!
 //! # The scan
 //!
-//! Between two vertices that are neighbours in the order of the lines, every line crosses the same
-//! edges, so the scan determines these edges once for the whole stretch. A convex polygon has two
-//! of them, and the smaller cell comes first: no sort is needed.
+//! Between two vertices that are neighbours in the order of the lines, every line crosses the same edges, so
+//! the scan determines these edges once for the whole stretch. A convex polygon has two of them, and the
+//! smaller cell comes first: no sort is needed.
 
 use super::edges::{COLUMNS, Crossing, Edge, FRACTION, ROWS, ScanDirection, SpanEnd};
 use crate::geometry::{Axis, Dropped, MAX_SIDES, Point, check};
@@ -40,8 +38,8 @@ use crate::geometry::{Axis, Dropped, MAX_SIDES, Point, check};
 /// Most spans in a line: a span needs two sides, one at each end.
 pub(crate) const MAX_SPANS: usize = MAX_SIDES / 2;
 
-/// A span: consecutive inside pixels of one line. The line is a column from [`columns`] and a row
-/// from [`rows`]. [`spans`] yields spans without crossings: `End` is `()` there.
+/// A span: consecutive inside pixels of one line. The line is a column from [`columns`] and a row from
+/// [`rows`]. [`spans`] yields spans without crossings: `End` is `()` there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span<End = Crossing> {
     /// The column's x, or the row's y.
@@ -54,8 +52,8 @@ pub struct Span<End = Crossing> {
     pub ends: [End; 2],
 }
 
-/// Passes every span of inside pixels in every column of the screen to `sink`: columns from left to
-/// right, and downward in each column.
+/// Passes every span of inside pixels in every column of the screen to `sink`: columns from left to right,
+/// and downward in each column.
 ///
 /// # Errors
 /// If the polygon is outside the legal range; then `sink` has received no span.
@@ -63,8 +61,8 @@ pub fn columns(polygon: &[impl Copy + Into<Point>], sink: impl FnMut(Span)) -> R
     scan::<Crossing>(polygon, &COLUMNS, sink)
 }
 
-/// Passes every span of inside pixels in every row of the screen to `sink`: rows downward, and from
-/// left to right in each row. The pixels are the same as those of [`columns`].
+/// Passes every span of inside pixels in every row of the screen to `sink`: rows downward, and from left to
+/// right in each row. The pixels are the same as those of [`columns`].
 ///
 /// # Errors
 /// If the polygon is outside the legal range; then `sink` has received no span.
@@ -87,8 +85,8 @@ pub fn spans_and_crossings(
     }
 }
 
-/// Passes the same spans as [`spans_and_crossings`] to `sink`, without the crossings, which cost
-/// more than the pixels.
+/// Passes the same spans as [`spans_and_crossings`] to `sink`, without the crossings, which cost more than
+/// the pixels.
 ///
 /// # Errors
 /// As for [`columns`].
@@ -145,8 +143,7 @@ fn scan<E: SpanEnd>(
         }
     };
     while line < stop {
-        // Move the edges that cross the line to the front. The other edges start later, or have
-        // ended.
+        // Move the edges that cross the line to the front. The other edges start later, or have ended.
         let (mut active, mut end) = (0, stop);
         for i in 0..edges.len() {
             let edge = &edges[i];

@@ -1,40 +1,39 @@
 //! Hidden surfaces: the visible face at each pixel, as visible spans, column by column.
 //!
-//! The faces of a convex solid that look at the viewer hide no part of each other, so such a solid
-//! needs nothing from this module. For any other solid, the faces are visited twice. First each
-//! face is laid over the columns: it keeps the pixels of its coverage where it is nearer than the
-//! face that was there. Then the mappers make the jobs of the visible faces, and each job is cut to
-//! its face's spans. So every pixel is written once, by the nearest face. No polygon is split,
-//! which would make T-junctions, and no mapper knows about it.
+//! The faces of a convex solid that look at the viewer hide no part of each other, so such a solid needs
+//! nothing from this module. For any other solid, the faces are visited twice. First each face is laid over
+//! the columns: it keeps the pixels of its coverage where it is nearer than the face that was there. Then the
+//! mappers make the jobs of the visible faces, and each job is cut to its face's spans. So every pixel is
+//! written once, by the nearest face. No polygon is split, which would make T-junctions, and no mapper knows
+//! about it.
 //!
 //! # Depth
 //!
-//! The ray t d through a pixel meets the plane n . p = s, where s = n . V for a point V of the
-//! plane, at 1 / t = (n . d) / s. Here n is the cross product of two edges between the face's three
-//! anchors, and n . d is a linear form of the screen as in [`crate::plane`]. s is above zero for a
-//! face that looks at the viewer. A face with n and s is nearer than a face with n' and s' when
-//! (n . d) s' > (n' . d) s, which is decided exactly. Of equally near faces, the first stays. Only
-//! the normal of a face that spans some 80 units or more is rounded: it is reduced to 45 bits,
-//! once, and s is computed from the reduced normal.
+//! The ray t d through a pixel meets the plane n . p = s, where s = n . V for a point V of the plane, at
+//! 1 / t = (n . d) / s. Here n is the cross product of two edges between the face's three anchors, and n . d
+//! is a linear form of the screen as in [`crate::plane`]. s is above zero for a face that looks at the
+//! viewer. A face with n and s is nearer than a face with n' and s' when (n . d) s' > (n' . d) s, which is
+//! decided exactly. Of equally near faces, the first stays. Only the normal of a face that spans some 80
+//! units or more is rounded: it is reduced to 45 bits, once, and s is computed from the reduced normal.
 //!
-//! A face that is seen exactly edge-on, or that rounding to the screen's grid has turned over
-//! (s <= 0), counts as infinitely far away: it shows only where no other face is.
+//! A face that is seen exactly edge-on, or that rounding to the screen's grid has turned over (s <= 0),
+//! counts as infinitely far away: it shows only where no other face is.
 //!
 //! # Why bisection finds the change between two faces
 //!
-//! Down a column both sides of the comparison are linear, so its result changes at most once. If
-//! the result is equal at two pixels, it is equal at all pixels between.
+//! Down a column both sides of the comparison are linear, so its result changes at most once. If the result
+//! is equal at two pixels, it is equal at all pixels between.
 //!
 //! # Ranges
 //!
-//! Anchors are within [`MAX_POSITION`](crate::plane::MAX_POSITION), 2^24, and the focal length is
-//! at most 2^9 pixels here. With n reduced to 45 bits, n . d is below 2^45 (320 + 240 + 2^10) <
-//! 2^56 and s is below 3 2^45 2^24 < 2^71, so a product of the two fits 127 bits.
+//! Anchors are within [`MAX_POSITION`](crate::plane::MAX_POSITION), 2^24, and the focal length is at most 2^9
+//! pixels here. With n reduced to 45 bits, n . d is below 2^45 (320 + 240 + 2^10) < 2^56 and s is below
+//! 3 2^45 2^24 < 2^71, so a product of the two fits 127 bits.
 //!
 //! # Capacity
 //!
-//! The spans of a column are disjoint and not empty, so a column has at most as many spans as
-//! pixels: the arena cannot overflow.
+//! The spans of a column are disjoint and not empty, so a column has at most as many spans as pixels: the
+//! arena cannot overflow.
 
 use super::spans::{Span, spans};
 use crate::geometry::{Axis, Dropped};
@@ -56,8 +55,8 @@ struct InverseDepth {
 }
 
 impl InverseDepth {
-    /// Infinitely far away, except that `over` is zero and has to be set. All zeros, so that a
-    /// static of them takes no space in an image.
+    /// Infinitely far away, except that `over` is zero and has to be set. All zeros, so that a static of them
+    /// occupies no space in an image.
     const NONE: Self = Self {
         form: Form {
             origin: 0,
@@ -162,7 +161,7 @@ pub struct Visible<const FACES: usize> {
 }
 
 impl<const FACES: usize> Visible<FACES> {
-    /// Returns a value without faces. It is all zeros, so a static takes no space in an image.
+    /// Returns a value without faces. It is all zeros, so a static occupies no space in an image.
     pub const fn new() -> Self {
         Self {
             columns: [ColumnSpans::EMPTY; WIDTH],
@@ -179,8 +178,7 @@ impl<const FACES: usize> Visible<FACES> {
         }
     }
 
-    /// Adds a face that looks at the viewer. `number` must be below `FACES` and different for each
-    /// face.
+    /// Adds a face that looks at the viewer. `number` must be below `FACES` and different for each face.
     ///
     /// # Errors
     /// If the polygon is outside the legal range; then no part of it was added.
@@ -278,8 +276,8 @@ impl<const FACES: usize> Default for Visible<FACES> {
     }
 }
 
-/// Returns the first number in `first + 1..=last` for which `holds` is false, given that it is true
-/// for `first`. `last` counts as false and is not tested.
+/// Returns the first number in `first + 1..=last` for which `holds` is false, given that it is true for
+/// `first`. `last` counts as false and is not tested.
 fn halve(first: u16, last: u16, holds: impl Fn(u16) -> bool) -> u16 {
     let (mut yes, mut no) = (first, last);
     while no - yes > 1 {

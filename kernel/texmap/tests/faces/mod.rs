@@ -9,13 +9,13 @@ use vga::Vga;
 pub const FOCAL_LENGTH: i32 = 258;
 const BACKGROUND: [u8; HEIGHT] = [0; HEIGHT];
 
-/// Texels of a padded texture; none has the background's colour.
+/// Returns the texels of a padded texture, all of other colours than the background.
 pub fn texels(width: u16, height: u16) -> Vec<u8> {
     let len = Texture::padded_len(width, height);
     (0..len).map(|i| (i * 31 % 251) as u8 | 1).collect()
 }
 
-/// A convex or irregular polygon anywhere near the screen, with coordinates inside the texture.
+/// Returns a convex or irregular polygon anywhere near the screen, with coordinates inside the texture.
 pub fn polygon(random: &mut fastrand::Rng, sides: usize, (w, h): (u16, u16)) -> Vec<Vertex> {
     let spread = [4, 40, 400][random.usize(..3)] * 256;
     let snap = [1, 128, 256][random.usize(..3)];
@@ -30,7 +30,7 @@ pub fn polygon(random: &mut fastrand::Rng, sides: usize, (w, h): (u16, u16)) -> 
         .collect()
 }
 
-/// Any three points: in front of the eye, behind it, across it; sometimes degenerate.
+/// Returns any three points: in front of the eye, behind it, across it; sometimes degenerate.
 pub fn anchors(random: &mut fastrand::Rng, (w, h): (u16, u16)) -> [Anchor; 3] {
     let most = 1 << random.u32(4..=24);
     let mut anchors = [(); 3].map(|()| Anchor {

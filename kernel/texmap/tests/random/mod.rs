@@ -10,7 +10,7 @@ pub const COLUMNS: u32 = 100_000;
 /// Columns that each deep test checks.
 pub const DEEP_COLUMNS: u32 = 1_000_000;
 
-/// A side of a texture: powers of two and other numbers, 1, the largest.
+/// Returns a side of a texture: powers of two and other numbers, 1, the largest.
 pub fn side(random: &mut fastrand::Rng) -> u16 {
     match random.u8(0..4) {
         0 => random.u16(1..=4),
@@ -19,8 +19,8 @@ pub fn side(random: &mut fastrand::Rng) -> u16 {
     }
 }
 
-/// A depth ratio: 1, or above 1 by 2^-20 to 1, or from 1 to 4096. Within each range every magnitude is
-/// equally likely.
+/// Returns a depth ratio: 1, or above 1 by 2^-20 to 1, or from 1 to 4096. Within each range every magnitude
+/// is equally likely.
 fn ratio(random: &mut fastrand::Rng) -> f64 {
     match random.u8(0..4) {
         0 => 1.0,
@@ -29,7 +29,7 @@ fn ratio(random: &mut fastrand::Rng) -> f64 {
     }
 }
 
-/// A coordinate at an end, inside the texture.
+/// Returns a coordinate at an end, inside the texture.
 fn end(random: &mut fastrand::Rng, size: u16) -> f64 {
     match random.u8(0..8) {
         0 => 0.0,
@@ -38,7 +38,8 @@ fn end(random: &mut fastrand::Rng, size: u16) -> f64 {
     }
 }
 
-/// A span of a visible face: c is above zero, and the coordinates are inside the texture, but for rounding.
+/// Returns a span of a visible face: c is above zero, and the coordinates are inside the texture, except for
+/// rounding.
 pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> PlaneStepper {
     let ratio = ratio(random);
     let near = (20.0 + 33.0 * random.f64()).exp2() * ratio.max(1.0);
@@ -66,7 +67,7 @@ pub fn seen(random: &mut fastrand::Rng, len: u16, size: (u16, u16)) -> PlaneStep
     }
 }
 
-/// Any span: outside the texture, across the horizon and behind it, and with c = 0 at a pixel.
+/// Returns any span: outside the texture, across the horizon and behind it, and with c = 0 at a pixel.
 pub fn any(random: &mut fastrand::Rng, len: u16) -> PlaneStepper {
     let value = |random: &mut fastrand::Rng, bits: u32| {
         let limit = 1i64 << random.u32(0..=bits);
@@ -88,8 +89,8 @@ pub fn any(random: &mut fastrand::Rng, len: u16) -> PlaneStepper {
     stepper
 }
 
-/// The quotient n / c in units of 2^-16 texel, clamped to a texture of `size` texels. On the horizon and
-/// beyond it, the value that the quotient tends to before the horizon.
+/// Returns the quotient n / c in units of 2^-16 texel, clamped to a texture of `size` texels. On the horizon
+/// and beyond it, the value that the quotient tends to before the horizon.
 pub fn truth(n: i64, c: i64, size: u16) -> f64 {
     let last = f64::from(size) * 65536.0 - 1.0;
     match (n < 0, c > 0) {
@@ -99,7 +100,7 @@ pub fn truth(n: i64, c: i64, size: u16) -> f64 {
     }
 }
 
-/// The error of the coordinates at pixel `i` of a walk: the larger of the two.
+/// Returns the error of the coordinates at pixel `i` of a span: the larger of the two.
 pub fn off(stepper: &PlaneStepper, i: u16, (u, v): (i32, i32), size: (u16, u16)) -> f64 {
     let [a, b, c] = stepper.after(i);
     let off = |n: i64, at: i32, size: u16| (truth(n, c, size) - f64::from(at)).abs();
