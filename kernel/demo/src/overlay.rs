@@ -286,7 +286,7 @@ impl<'a> Overlay<'a> {
             }
         }
         match reduced_faces {
-            Some(faces) if mapper.lower().is_some() => {
+            Some(faces) if mapper.reduced().is_some() => {
                 line(
                     Ink::Plain,
                     format_args!("faces in reduced quality: {faces}"),

@@ -85,7 +85,7 @@ impl MapperChoice {
     /// Returns the choice of mappers for a frame of `pose`.
     pub fn new(options: &RenderOptions, pose: &Pose) -> Self {
         let next = options.next.filter(|next| next != pose);
-        let reduced = options.mapper.lower().zip(next);
+        let reduced = options.mapper.reduced().zip(next);
         Self {
             full: options.mapper,
             reduced: reduced.map(|(reduced, next)| (reduced, PoseChange::new(pose, &next))),

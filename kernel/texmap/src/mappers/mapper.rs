@@ -236,7 +236,7 @@ impl Mapper {
     /// Returns the mapper of reduced quality, which is faster and less accurate, for objects in motion, or
     /// `None` if this mapper has no reduced quality. A tolerance below two texels becomes two texels, and an
     /// exact or nearly exact mapper becomes linear pieces.
-    pub fn lower(self) -> Option<Self> {
+    pub fn reduced(self) -> Option<Self> {
         const UNSEEN: Tolerance = Tolerance::new(2, 1).expect("two texels are legal");
         match self {
             Self::Within(tolerance) if tolerance < UNSEEN => Some(Self::Within(UNSEEN)),
@@ -322,15 +322,15 @@ mod tests {
     fn a_reduced_mapper_is_drawn_by_the_same_loops_and_is_not_reduced_again() {
         let mut some = 0;
         for (name, mapper, _) in Mapper::ALL {
-            if let Some(reduced) = mapper.lower() {
+            if let Some(reduced) = mapper.reduced() {
                 some += 1;
                 assert_eq!(reduced.style(), mapper.style(), "{name}");
-                assert_eq!(reduced.lower(), None, "{name}");
+                assert_eq!(reduced.reduced(), None, "{name}");
             }
         }
-        assert_eq!(Mapper::Exact.lower(), Mapper::parse("linear-16"));
-        assert_eq!(Mapper::parse("within-3").unwrap().lower(), None);
-        assert_eq!(Mapper::default().lower(), None);
+        assert_eq!(Mapper::Exact.reduced(), Mapper::parse("linear-16"));
+        assert_eq!(Mapper::parse("within-3").unwrap().reduced(), None);
+        assert_eq!(Mapper::default().reduced(), None);
         assert!(some > 8, "{some}");
     }
 }
