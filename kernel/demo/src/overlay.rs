@@ -447,6 +447,11 @@ mod tests {
             verdict(10, 3 << 15, 3 << 16)[1],
             plain("sweet spot 2.00 to 0.50: too few frames")
         );
+        // Both ends of the sweet spot belong to it, also where they are equal.
+        assert_eq!(
+            verdict(1, 13_107, 1 << 16)[1],
+            bright("sweet spot 0.19 to 0.19")
+        );
         // Nothing moves in the texture.
         assert_eq!(verdict(1, 3 << 15, 0), [plain("1.50 pixels a frame")]);
     }
