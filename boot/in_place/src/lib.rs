@@ -3,6 +3,20 @@
 //! `Box::new(Large::new())` builds its argument on the stack unless the compiler optimises that away, and a
 //! thread has 2 MiB of stack or less. [`boxed!`] copies an empty value from a static to the heap in one
 //! piece.
+//!
+//! ```
+//! #[derive(Clone, Copy)]
+//! struct Large([u8; 4 << 20]);
+//!
+//! impl Large {
+//!     const fn new() -> Self {
+//!         Self([0; 4 << 20])
+//!     }
+//! }
+//!
+//! let mut large = in_place::boxed!(Large);
+//! large.0[0] = 1;
+//! ```
 #![forbid(unsafe_code)]
 
 use std::ops::{Deref, DerefMut};

@@ -20,6 +20,17 @@
 //! [`Destination`] is the trait through which the renderer writes pixels. [`Canvas`] (a page
 //! of the card), [`PlanarBuffer`] (a page of the same layout in RAM), [`Offscreen`] (a page in RAM
 //! that can be presented) and [`Window`] (a part of any of them) implement it.
+//!
+//! ```
+//! use modex::{Destination, PlanarBuffer, STRIDE};
+//!
+//! let mut page = PlanarBuffer::new();
+//! // Three pixels of colour 7, downward from (5, 10).
+//! page.column(5, 10, 3, |column| column.fill(|| 7));
+//! assert_eq!(page.pixel(5, 12), 7);
+//! // Column 5 lies in plane 1, one byte from the start of each line.
+//! assert_eq!(page.planes[5 & 3][10 * STRIDE + 5 / 4], 7);
+//! ```
 #![no_std]
 
 mod bus;
