@@ -1,23 +1,14 @@
 //! Frames of the built-in scenes.
 
+mod common;
+
+use common::with_renderer;
 use modex::PlanarBuffer;
-use render::{RenderMemory, RenderOptions, SceneRenderer};
-use scene::catalogue::{CATALOGUE, Entry, MAX_TEXELS};
+use render::RenderOptions;
+use scene::catalogue::CATALOGUE;
 
 /// Ticks from a whole turn, at irregular intervals.
 const TICKS: [u32; 9] = [0, 1, 89, 180, 271, 360, 447, 540, 719];
-
-/// Calls `check` with a scene's entry and its renderer.
-fn with_renderer(name: &str, check: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>)) {
-    let entry = Entry::parse(name).unwrap();
-    let mut texels = Box::new([0; MAX_TEXELS]);
-    let textures = entry.paint(&mut texels);
-    let mut memory = in_place::boxed!(RenderMemory);
-    check(
-        entry,
-        &mut SceneRenderer::new(&mut memory, entry.scene(&textures)),
-    );
-}
 
 #[test]
 fn every_frame_is_whole_and_shows_its_scene() {

@@ -6,28 +6,19 @@
 //! as crawling. The mean square of the change is the energy. An error that stays, such as the hue of a mean
 //! that the palette lacks, does not count.
 
+mod common;
+
+use common::with_renderer;
 use modex::{HEIGHT, PlanarBuffer, WIDTH};
 use oracle::depth::nearest;
-use render::{RenderMemory, RenderOptions, SceneRenderer};
+use render::{RenderOptions, SceneRenderer};
 use scene::Pose;
-use scene::catalogue::{Entry, MAX_TEXELS};
+use scene::catalogue::Entry;
 use texmap::plane::Form;
 use texmap::{Mapper, Plane};
 
 /// Samples across a pixel, and as many down.
 const PLACES: i64 = 8;
-
-/// Calls `work` with a scene's entry and its renderer, and returns its result.
-fn with_renderer<T>(name: &str, work: impl FnOnce(&Entry<'_>, &mut SceneRenderer<'_>) -> T) -> T {
-    let entry = Entry::parse(name).unwrap();
-    let mut texels = Box::new([0; MAX_TEXELS]);
-    let textures = entry.paint(&mut texels);
-    let mut memory = in_place::boxed!(RenderMemory);
-    work(
-        entry,
-        &mut SceneRenderer::new(&mut memory, entry.scene(&textures)),
-    )
-}
 
 /// Returns the mean of the samples of each pixel that covers more than two texels: red, green and blue, 0 to
 /// 63. At other pixels the exact mapper leaves out hardly any texel.
