@@ -22,12 +22,11 @@
 
 use modex::Column;
 
-use super::mapped_span::{MappedSpan, SpanKind, map_plane};
 use super::pieces::Cuts;
-use crate::geometry::{Axis, Dropped, Texture};
+use crate::geometry::Texture;
 use crate::loops::PixelSink;
 use crate::plane::bounds::SpanBound;
-use crate::plane::{self, Face, PlaneStepper, Subdivision};
+use crate::plane::{self, PlaneStepper, Subdivision};
 
 /// The largest useful margin of an estimate, in units of 2^-16 texel.
 const MARGIN: u32 = 2048;
@@ -35,14 +34,6 @@ const MARGIN: u32 = 2048;
 const SHORTEST: u8 = 16;
 /// Below this number of pixels, dividing costs less than making the estimate.
 const LEAST: u16 = 24;
-
-/// Passes the spans of a face's columns to `sink`.
-///
-/// # Errors
-/// If the polygon is outside the legal range; then `sink` has received no span.
-pub(crate) fn map(face: &Face<'_>, sink: &mut dyn FnMut(MappedSpan)) -> Result<(), Dropped> {
-    map_plane(Axis::Down, face, SpanKind::Exact, sink)
-}
 
 /// Writes the texels of the quotients to `sink`.
 #[inline(always)]

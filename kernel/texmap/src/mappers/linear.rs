@@ -15,28 +15,11 @@ use crate::loops::{AffineStepper, Draw, Loop};
 use crate::loops::{extract_eights, shifts_eights};
 use crate::plane::{Face, LONGEST_POWER, LargeReciprocal, PlaneStepper, Reciprocal, Subdivision};
 
-/// Passes the spans of a face's columns to `sink`.
-///
-/// # Errors
-/// If the polygon is outside the legal range; then `sink` has received no span.
-pub(crate) fn map(
-    pieces: Subdivision,
-    face: &Face<'_>,
-    sink: &mut dyn FnMut(MappedSpan),
-) -> Result<(), Dropped> {
-    map_plane(
-        Axis::Down,
-        face,
-        |stepper| SpanKind::Linear(stepper, pieces),
-        sink,
-    )
-}
-
 /// Passes the spans of a face to `sink`, in pieces of 16 pixels along columns or rows, whichever direction
 /// changes the depth less.
 ///
 /// # Errors
-/// As for [`map`].
+/// If the polygon is outside the legal range; then `sink` has received no span.
 pub(crate) fn map_row_or_column(
     face: &Face<'_>,
     sink: &mut dyn FnMut(MappedSpan),

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use super::mapped_span::MappedSpan;
-use super::{affine, constant_z, exact, free_direction, linear, quadratic, tiles, within};
+use super::mapped_span::{MappedSpan, SpanKind, map_plane};
+use super::{affine, constant_z, free_direction, linear, tiles, within};
 use crate::geometry::{Axis, Dropped, Texture};
 use crate::loops::{Loop, Rows, Style};
 use crate::plane::{Face, Subdivision, Tolerance};
@@ -276,9 +276,15 @@ impl Mapper {
             Self::Rows(_) => affine::map_half_steps(Axis::Right, face, texture, sink),
             Self::Affine(by) => affine::map(by, face, texture, sink),
             Self::HalfStep => affine::map_half_steps(Axis::Down, face, texture, sink),
-            Self::Exact => exact::map(face, sink),
-            Self::Linear(pieces) => linear::map(pieces, face, sink),
-            Self::Quadratic(pieces) => quadratic::map(pieces, face, sink),
+            Self::Exact => map_plane(Axis::Down, face, SpanKind::Exact, sink),
+            Self::Linear(pieces) => {
+                let kind = |stepper| SpanKind::Linear(stepper, pieces);
+                map_plane(Axis::Down, face, kind, sink)
+            }
+            Self::Quadratic(pieces) => {
+                let kind = |stepper| SpanKind::Quadratic(stepper, pieces);
+                map_plane(Axis::Down, face, kind, sink)
+            }
             Self::RowOrColumn => linear::map_row_or_column(face, sink),
             Self::Tiles => tiles::map(face, texture, sink),
             Self::FreeDirection => free_direction::map(face, texture, sink),

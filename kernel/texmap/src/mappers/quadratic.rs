@@ -24,27 +24,9 @@
 
 use modex::Column;
 
-use super::mapped_span::{MappedSpan, SpanKind, map_plane};
 use super::pieces::{Cuts, INVERSES, Piece};
-use crate::geometry::{Axis, Dropped, Texture};
-use crate::plane::{Face, PlaneStepper, Subdivision, quotients};
-
-/// Passes the spans of a face's columns to `sink`.
-///
-/// # Errors
-/// If the polygon is outside the legal range; then `sink` has received no span.
-pub(crate) fn map(
-    pieces: Subdivision,
-    face: &Face<'_>,
-    sink: &mut dyn FnMut(MappedSpan),
-) -> Result<(), Dropped> {
-    map_plane(
-        Axis::Down,
-        face,
-        |stepper| SpanKind::Quadratic(stepper, pieces),
-        sink,
-    )
-}
+use crate::geometry::Texture;
+use crate::plane::{PlaneStepper, Subdivision, quotients};
 
 /// Returns `delta 2^32 / steps`, and that divided by `steps` again; |delta| < 2^27.
 ///
