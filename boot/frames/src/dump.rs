@@ -316,14 +316,12 @@ impl<'a> DumpReader<'a> {
         };
         let mapper = match self.line("mapper")? {
             "none" => None,
-            // Version 5 renamed some mappers.
-            old if version < 5 && Mapper::renamed(old).is_some() => {
-                Mapper::renamed(old).and_then(Word::new)
+            name => {
+                // Version 5 renamed some mappers.
+                let new = Mapper::renamed(name).filter(|_| version < 5);
+                let word = Word::new(new.unwrap_or(name));
+                Some(word.ok_or_else(|| format!("{} is not a mapper's name", quoted(name)))?)
             }
-            name => Some(
-                Word::new(name)
-                    .ok_or_else(|| format!("{} is not a mapper's name", quoted(name)))?,
-            ),
         };
         let frame = match self.line(frame)? {
             "none" => None,
