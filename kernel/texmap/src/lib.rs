@@ -57,7 +57,7 @@ pub use draw::{Job, JobList, Order, Renderer, Stats};
 pub use geometry::{
     Axis, Dropped, MAX_COORDINATE, MAX_SIDES, Point, SUBPIXELS, Texture, TextureError, Vertex,
 };
-pub use loops::{AffineStepper, Loop, Rows, Style};
+pub use loops::{AffineStepper, Loop, Quotients, Rows, Style};
 pub use mappers::{Mapper, SpanKind};
 pub use plane::{Face, Plane, PlaneStepper, Subdivision, Tolerance};
 pub use scan::Visible;

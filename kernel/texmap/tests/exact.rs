@@ -1,9 +1,12 @@
 //! Checks the exact mapper against its definition, in integers twice as wide; and its quantised plane against
 //! the exact plane. Failures that a sweep of texels finds are pasted in here.
 
+use modex::{Destination, PlanarBuffer};
 use oracle::plane::{FOCAL_LENGTH, PlaneChecker, PlaneCounts, PlaneMix, anchor};
 use oracle::texel::forms;
-use texmap::plane::{Anchor, MAX_POSITION, Plane, ROUNDING};
+use texmap::mappers::exact;
+use texmap::plane::{Anchor, MAX_POSITION, Plane, PlaneStepper, ROUNDING, texel};
+use texmap::{Axis, Quotients, Texture};
 
 /// Cases of each mix: as many as `cargo sweep --only texels` runs in half a second.
 const CASES: u64 = 1500;
@@ -44,6 +47,51 @@ fn every_texel_is_the_floor_of_the_quotient() {
             PlaneMix::ThroughEye | PlaneMix::BehindEye => assert!(clamps),
         }
     }
+}
+
+/// Textures whose rows lie side by side, padded textures and tiles: each way computes its own index.
+#[test]
+fn every_way_reads_the_same_texel_of_every_kind_of_texture() {
+    let mut random = seeded::generator();
+    let texels: Vec<u8> = (0..1 << 16).map(|_| random.u8(..)).collect();
+    let mut page = Box::new(PlanarBuffer::new());
+    let mut inside = 0;
+    for case in 0..3000 {
+        let size = [random.u16(1..=256), random.u16(1..=256)];
+        let [width, height] = size;
+        let tile = [random.u32(0..=8), random.u32(0..=8)].map(|bits| 1u16 << bits);
+        let len = |[across, down]: [u16; 2]| usize::from(across) * usize::from(down);
+        let texture = match case % 3 {
+            0 => Texture::new(&texels[..len(size)], width, height),
+            1 => {
+                let padded = Texture::padded_len(width, height);
+                Texture::padded(&texels[..padded], width, height)
+            }
+            _ => Texture::tiled(&texels[..len(tile)], tile.into(), width, height),
+        }
+        .unwrap();
+        let anchors = [(); 3].map(|()| anchor(&mut random, 7, 24, size.into()));
+        let plane = Plane::new(&anchors, FOCAL_LENGTH);
+        let (x, y) = (random.u16(0..320), random.u16(0..240));
+        let len = random.u16(1..=240 - y);
+        let stepper = PlaneStepper::new(&plane, Axis::Down, x, y);
+        let expected: Vec<u8> = (0..len)
+            .map(|i| {
+                let [a, b, c] = stepper.after(i);
+                inside += u32::from(a >= 0 && b >= 0 && a < 256 * c && b < 256 * c);
+                let at = |n, size| i32::from(texel(n, c, size)) << 16;
+                texture.at(at(a, width), at(b, height))
+            })
+            .collect();
+        for way in Quotients::ALL {
+            page.column(x, y, len, |column| {
+                exact::column(&texture, stepper, way, column)
+            });
+            let found = (y..y + len).map(|y| page.pixel(x.into(), y.into()));
+            assert!(found.eq(expected.iter().copied()), "{way:?}, case {case}");
+        }
+    }
+    assert!(inside > 50_000, "only {inside} pixels lie inside");
 }
 
 /// The plane's forms are the exact forms after one shift, with an error of at most [`ROUNDING`]. So the

@@ -9,7 +9,7 @@ use fastrand::Rng;
 use modex::{Destination, PlanarBuffer};
 use texmap::mappers::exact;
 use texmap::plane::{Anchor, Form, MAX_POSITION, Plane, PlaneStepper, ROUNDING};
-use texmap::{Axis, Texture};
+use texmap::{Axis, Quotients, Texture};
 
 use crate::mix::stream;
 use crate::texel::{forms, perspective};
@@ -201,6 +201,8 @@ pub enum PlaneError {
         y: u16,
         /// Whether the texel differs down the texture, not across.
         down: bool,
+        /// The way to compute the quotients.
+        way: Quotients,
         /// The texel by the definition.
         expected: u16,
         /// The texel that the mapper read.
@@ -217,13 +219,14 @@ impl fmt::Display for PlaneError {
                 x,
                 y,
                 down,
+                way,
                 expected,
                 found,
             } => {
                 let axis = if *down { "down" } else { "across" };
                 write!(
                     f,
-                    "({x}, {y}) reads texel {found} {axis}, but the quotient's floor is {expected}"
+                    "({x}, {y}) reads texel {found} {axis} by {way:?}, but the quotient's floor is {expected}"
                 )
             }
         }
@@ -307,25 +310,31 @@ impl PlaneChecker {
             let texels = &axes[usize::from(down)][..usize::from(w) * usize::from(h)];
             let texture = Texture::new(texels, w, h).expect("a legal size");
             let stepper = PlaneStepper::new(plane, Axis::Down, x, y);
-            self.page.column(x, y, len, |column| {
-                exact::column(&texture, stepper, len, column)
-            });
+            for way in Quotients::ALL.into_iter().filter(|way| way.runs_here()) {
+                self.page.column(x, y, len, |column| {
+                    exact::column(&texture, stepper, way, column)
+                });
+                for y in y..y + len {
+                    let (n, c) = (at(&form, x, y), at(&plane.c, x, y));
+                    let expected = perspective(n, c, size);
+                    let found = self.page.pixel(x.into(), y.into()).into();
+                    if expected != found {
+                        return Err(PlaneError::Texel {
+                            x,
+                            y,
+                            down,
+                            way,
+                            expected,
+                            found,
+                        });
+                    }
+                }
+            }
             for (y, (clamped, tied)) in (y..y + len).zip(&mut marks) {
                 let (n, c) = (at(&form, x, y), at(&plane.c, x, y));
-                let expected = perspective(n, c, size);
-                let found = self.page.pixel(x.into(), y.into()).into();
-                if expected != found {
-                    return Err(PlaneError::Texel {
-                        x,
-                        y,
-                        down,
-                        expected,
-                        found,
-                    });
-                }
                 let outside = n < 0 || n >= i128::from(size) * c;
                 *clamped |= outside;
-                *tied |= !outside && n == i128::from(expected) * c;
+                *tied |= !outside && n == i128::from(perspective(n, c, size)) * c;
             }
         }
         let marks = &marks[..len.into()];

@@ -3,7 +3,9 @@
 use modex::{Column, Destination, Lane};
 
 use crate::geometry::{Axis, Dropped, Texture};
-use crate::loops::{AffineLoops, LineStepper, PixelSink, RowPixels, Rows, SpanPixels, Style};
+use crate::loops::{
+    AffineLoops, DrawQuotients, LineStepper, PixelSink, RowPixels, Rows, SpanPixels, Style,
+};
 use crate::mappers::adaptive::{self, AdaptivePieces};
 use crate::mappers::coordinates::Coordinates;
 use crate::mappers::linear::{self, DrawLinear};
@@ -22,6 +24,7 @@ impl Style {
             affine: AffineLoops::new(self.affine),
             linear: linear::drawing(self.affine),
             rows: self.rows,
+            quotients: self.quotients.draw(),
         }
     }
 }
@@ -33,6 +36,8 @@ pub(crate) struct StyleFunctions {
     /// Draws columns in linear pieces.
     linear: DrawLinear,
     rows: Rows,
+    /// Draws the exact quotients of columns.
+    quotients: DrawQuotients,
 }
 
 /// One span to draw: its place, and everything its inner loop needs.
@@ -284,10 +289,11 @@ impl Job {
             &SpanKind::Quadratic(stepper, pieces) => {
                 quadratic::draw(texture, stepper, self.len, pieces, column);
             }
-            &SpanKind::Exact(stepper) => exact::column(texture, stepper, self.len, column),
+            &SpanKind::Exact(stepper) => exact::draw(texture, stepper, functions.quotients, column),
             SpanKind::Adaptive(stepper, tolerance) => {
                 let pieces = self.pieces(stepper, *tolerance, texture);
-                adaptive::draw::<1>(pieces, 0, texture, functions.affine, column);
+                let loops = (functions.affine, functions.quotients);
+                adaptive::draw::<1>(pieces, 0, texture, loops, column);
             }
             SpanKind::Upright(stepper) => stepper.column(texture, column),
             SpanKind::Affine(_) | SpanKind::FreeDirection(_) => {
@@ -366,11 +372,13 @@ impl Job {
                 functions.affine.fill(texture, stepper, pixels.part(0, len));
             }
             SpanKind::Exact(stepper) => {
-                exact::fill(texture, stepper.every(STRIDE, first), pixels.part(0, len));
+                let stepper = stepper.every(STRIDE, first);
+                exact::fill(texture, stepper, functions.quotients, &mut pixels, 0, len);
             }
             SpanKind::Adaptive(stepper, tolerance) => {
                 let pieces = self.pieces(stepper, *tolerance, texture);
-                adaptive::draw::<STRIDE>(pieces, first, texture, functions.affine, pixels);
+                let loops = (functions.affine, functions.quotients);
+                adaptive::draw::<STRIDE>(pieces, first, texture, loops, pixels);
             }
             SpanKind::Linear(stepper, pieces) => {
                 let mut cuts = Cuts::new(*stepper, self.len, *pieces, texture);

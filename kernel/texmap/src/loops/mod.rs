@@ -6,6 +6,7 @@
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod cpu;
+pub(crate) mod quotients;
 pub(crate) mod registers;
 pub(crate) mod select;
 pub(crate) mod sink;
@@ -14,6 +15,8 @@ pub(crate) mod style;
 #[cfg(target_arch = "x86_64")]
 pub(crate) mod tuned;
 
+pub use quotients::Quotients;
+pub(crate) use quotients::{DrawQuotients, InsideSpan};
 pub use select::Loop;
 pub(crate) use select::{AffineLoops, Draw};
 pub(crate) use sink::{PixelSink, RowPixels, SpanPixels};

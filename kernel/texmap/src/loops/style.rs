@@ -1,5 +1,6 @@
 //! Styles: which loops draw a mapper's spans.
 
+use super::quotients::Quotients;
 use super::select::Loop;
 
 /// How the pixels of a row are written.
@@ -24,4 +25,6 @@ pub struct Style {
     pub affine: Loop,
     /// The way to write rows.
     pub rows: Rows,
+    /// The way to compute exact quotients down columns.
+    pub quotients: Quotients,
 }

@@ -26,7 +26,7 @@
 use super::exact;
 use super::pieces::between;
 use crate::geometry::Texture;
-use crate::loops::{AffineLoops, AffineStepper, SpanPixels};
+use crate::loops::{AffineLoops, AffineStepper, DrawQuotients, SpanPixels};
 use crate::plane::bounds::Chords;
 use crate::plane::{PlaneStepper, Reciprocal, Tolerance, quotients_and_excess};
 
@@ -269,7 +269,7 @@ pub(crate) fn draw<const STRIDE: u16>(
     mut pieces: AdaptivePieces,
     first: u16,
     texture: &Texture<'_>,
-    loops: AffineLoops,
+    (affine, quotients): (AffineLoops, DrawQuotients),
     mut pixels: impl SpanPixels,
 ) {
     // The index of the first drawn pixel that is not before `pixel` of the span.
@@ -282,14 +282,14 @@ pub(crate) fn draw<const STRIDE: u16>(
         if from < to {
             let skipped = from * STRIDE + first - piece.first;
             let stepper = piece.stepper.every(STRIDE.into(), skipped.into());
-            loops.fill(texture, stepper, pixels.part(from, to - from));
+            affine.fill(texture, stepper, pixels.part(from, to - from));
         }
     }
     if let Some((from, len, stepper)) = pieces.rest() {
         let (from, to, pixel) = (place(from), place(from + len), from);
         if from < to {
             let stepper = stepper.every(STRIDE, from * STRIDE + first - pixel);
-            exact::fill(texture, stepper, pixels.part(from, to - from));
+            exact::fill(texture, stepper, quotients, &mut pixels, from, to - from);
         }
     }
 }

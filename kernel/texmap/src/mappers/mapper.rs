@@ -5,7 +5,7 @@ use core::fmt;
 use super::mapped_span::{MappedSpan, SpanKind, map_plane};
 use super::{affine, constant_z, free_direction, linear, tiles, within};
 use crate::geometry::{Axis, Dropped, Texture};
-use crate::loops::{Loop, Rows, Style};
+use crate::loops::{Loop, Quotients, Rows, Style};
 use crate::plane::{Face, Subdivision, Tolerance};
 
 /// A way to map a texture.
@@ -252,6 +252,7 @@ impl Mapper {
         let mut style = Style {
             affine: Loop::fastest(),
             rows: Rows::Lines,
+            quotients: Quotients::fastest(),
         };
         match self {
             Self::Rows(rows) => style.rows = rows,

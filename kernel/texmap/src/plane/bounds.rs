@@ -222,20 +222,6 @@ impl SpanBound {
         error.min(self.most.into()) as u32
     }
 
-    /// Returns the number of steps from the first pixel to the last.
-    pub(crate) fn steps(&self) -> u16 {
-        self.steps
-    }
-
-    /// Returns a lower bound of the error of a single chord over the whole span, not counting fixed point. A
-    /// chord over n of the span's steps at the far end has at least n^2 / steps^2 of this error.
-    ///
-    /// That follows because p n x / (...) is n^2 times a falling function of n. The table is too large by at
-    /// most 13 %, which the factor 7/8 removes.
-    pub(crate) fn chord_at_least(&self) -> u64 {
-        (self.chord(2 * u64::from(self.steps)) / 8 * 7).saturating_sub(2)
-    }
-
     /// Returns the closed form for a chord over `halves` half pixels at the far end.
     fn chord(&self, halves: u64) -> u64 {
         let x = (self.relative_slope.saturating_mul(halves)).div_ceil(2);
