@@ -188,10 +188,17 @@ fn about(options: &TradeOptions, mappers: &[Mapper]) -> Vec<String> {
     }
     let extract = Mapper::Affine(Loop::Extract);
     if mappers.contains(&extract) {
-        about.push(match cost::beyond_baseline(extract) {
-            Some(_) => "`extract` needs BMI2; \"without\" is its portable reference.".into(),
-            None => "This CPU has no BMI2, so `extract` is its portable reference here.".into(),
+        about.push(match cost::LesserLoop::of(extract)[..] {
+            [_, ..] => "`extract` needs BMI2; \"without\" is its portable reference.".into(),
+            [] => "This CPU has no BMI2, so `extract` is its portable reference here.".into(),
         });
+    }
+    if mappers.contains(&Mapper::Exact) {
+        about.push(
+            "`exact` uses the widest vector instructions of the CPU; the loops of lesser CPUs, which have \
+             the same texels, are beside it."
+                .into(),
+        );
     }
     about
 }

@@ -8,7 +8,9 @@
 
 use modex::{Destination, PlanarBuffer};
 use texmap::plane::Anchor;
-use texmap::{Axis, Job, Loop, Mapper, Order, Renderer, SpanKind, Texture, Vertex};
+use texmap::{
+    Axis, Job, Loop, Mapper, Order, Quotients, Renderer, SpanKind, Style, Texture, Vertex,
+};
 
 use super::accuracy::FrameJobs;
 use super::clock;
@@ -48,8 +50,8 @@ enum Drawer {
     /// A load and a store for each pixel, and nothing else.
     Bare(Traversal),
     Mapper(Mapper),
-    /// The portable reference of a mapper's loop.
-    Portable(Loop),
+    /// The loop of a CPU with fewer instructions than this one.
+    Lesser(LesserLoop),
 }
 
 impl Drawer {
@@ -80,11 +82,49 @@ struct Contestant<'a> {
     draw: DrawFn<'a>,
 }
 
-/// Returns the mapper's loop, if this CPU runs it with instructions beyond the baseline of its architecture.
-pub fn beyond_baseline(mapper: Mapper) -> Option<Loop> {
-    match mapper {
-        Mapper::Affine(Loop::Extract) if Loop::Extract.is_tuned_here() => Some(Loop::Extract),
-        _ => None,
+/// A loop with the same texels as a mapper's own loop, for a CPU with fewer instructions than this one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LesserLoop {
+    /// The portable version of an affine loop.
+    Portable(Loop),
+    /// A way to compute exact quotients.
+    Quotients(Quotients),
+}
+
+impl LesserLoop {
+    /// Returns the lesser loops of a mapper, if its own loop has instructions beyond the baseline of the
+    /// CPU's architecture.
+    pub fn of(mapper: Mapper) -> Vec<Self> {
+        match mapper {
+            Mapper::Affine(Loop::Extract) if Loop::Extract.is_tuned_here() => {
+                vec![Self::Portable(Loop::Extract)]
+            }
+            Mapper::Exact => {
+                let ways = Quotients::ALL.into_iter().rev();
+                let lesser = ways.filter(|&way| way.runs_here() && way != Quotients::fastest());
+                lesser.map(Self::Quotients).collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
+    /// Returns the mapper that has the same texels.
+    fn mapper(self) -> Mapper {
+        match self {
+            Self::Portable(by) => Mapper::Affine(by),
+            Self::Quotients(_) => Mapper::Exact,
+        }
+    }
+
+    /// Returns what the loop does with or without.
+    pub fn label(self) -> &'static str {
+        match self {
+            Self::Portable(_) => "without BMI2",
+            Self::Quotients(Quotients::Avx512) => "with AVX-512",
+            Self::Quotients(Quotients::Avx2) => "with AVX2",
+            Self::Quotients(Quotients::Guess) => "without AVX",
+            Self::Quotients(Quotients::Divide) => "by integer divisions",
+        }
     }
 }
 
@@ -100,7 +140,7 @@ pub struct PixelCost {
 }
 
 /// The costs of one mapper.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct MapperCost {
     /// The mapper.
     pub mapper: Mapper,
@@ -110,9 +150,8 @@ pub struct MapperCost {
     pub loops: PixelCost,
     /// The cost of the whole frame.
     pub frame: PixelCost,
-    /// The cost of drawing alone with the portable reference, for a loop with instructions beyond the
-    /// baseline.
-    pub portable: Option<PixelCost>,
+    /// The costs of drawing alone with the mapper's lesser loops.
+    pub lesser: Vec<(LesserLoop, PixelCost)>,
 }
 
 /// The time that a measurement may need.
@@ -160,12 +199,11 @@ fn in_order(order: Order, (mut jobs, pixels): (Vec<Job>, u64)) -> (Vec<Job>, u64
 /// Draws jobs as [`Renderer`] does.
 fn draw(
     jobs: &[Job],
-    mapper: Mapper,
+    style: Style,
     order: Order,
     textures: &[Texture<'_>],
     page: &mut PlanarBuffer,
 ) {
-    let style = mapper.style();
     match order {
         Order::Polygons => {
             for job in jobs {
@@ -307,15 +345,27 @@ fn contestants<'a>(
             });
         }
     }
-    for portable in mappers.iter().copied().filter_map(beyond_baseline) {
+    for lesser in mappers.iter().copied().flat_map(LesserLoop::of) {
+        let mapper = lesser.mapper();
         for order in ORDERS {
-            let (jobs, pixels) = in_order(order, jobs(affine, faces, workload));
-            all.push(Contestant {
-                key: (Drawer::Portable(portable), order, Scope::Loops),
-                pixels,
-                draw: Box::new(move |arena| {
-                    draw_by_portable(&jobs, portable, order, &workload.textures, &mut arena.page);
+            let (jobs, pixels) = in_order(order, jobs(mapper, faces, workload));
+            let textures = &workload.textures;
+            let draw: DrawFn<'a> = match lesser {
+                LesserLoop::Portable(portable) => Box::new(move |arena| {
+                    draw_by_portable(&jobs, portable, order, textures, &mut arena.page);
                 }),
+                LesserLoop::Quotients(quotients) => {
+                    let style = Style {
+                        quotients,
+                        ..mapper.style()
+                    };
+                    Box::new(move |arena| draw(&jobs, style, order, textures, &mut arena.page))
+                }
+            };
+            all.push(Contestant {
+                key: (Drawer::Lesser(lesser), order, Scope::Loops),
+                pixels,
+                draw,
             });
         }
     }
@@ -325,7 +375,8 @@ fn contestants<'a>(
                 let (jobs, pixels) = in_order(order, jobs(mapper, faces, workload));
                 let draw: DrawFn<'a> = match scope {
                     Scope::Loops => Box::new(move |arena| {
-                        draw(&jobs, mapper, order, &workload.textures, &mut arena.page);
+                        let style = mapper.style();
+                        draw(&jobs, style, order, &workload.textures, &mut arena.page);
                     }),
                     Scope::Frame => Box::new(move |arena| {
                         let DrawMemory { page, jobs } = arena;
@@ -437,10 +488,13 @@ pub fn measure(
                 order,
                 loops: times.cost(mapper, order, Scope::Loops),
                 frame: times.cost(mapper, order, Scope::Frame),
-                portable: beyond_baseline(mapper).and_then(|portable| {
-                    let key = (Drawer::Portable(portable), order, Scope::Loops);
-                    times.cost_of(key, Drawer::bare(mapper))
-                }),
+                lesser: LesserLoop::of(mapper)
+                    .into_iter()
+                    .filter_map(|lesser| {
+                        let key = (Drawer::Lesser(lesser), order, Scope::Loops);
+                        Some((lesser, times.cost_of(key, Drawer::bare(mapper))?))
+                    })
+                    .collect(),
             });
         }
     }
@@ -652,8 +706,8 @@ mod tests {
             let costs = measure(workload, 1, &some(), TINY);
             assert_eq!(costs.len(), 2 * some().len());
             for costs in &costs {
-                let portable = beyond_baseline(costs.mapper);
-                assert_eq!(costs.portable.is_some(), portable.is_some());
+                let lesser = LesserLoop::of(costs.mapper).into_iter();
+                assert!(lesser.eq(costs.lesser.iter().map(|&(by, _)| by)));
                 for cost in [costs.loops, costs.frame] {
                     for spread in [cost.time, cost.to_bare, cost.to_packed] {
                         assert!(spread.least > 0.0 && spread.most.is_finite(), "{costs:?}");
@@ -678,11 +732,8 @@ mod tests {
             let mappers = some();
             let faces = &workload.frames[1];
             let all = contestants(&mappers, faces, workload, &[Scope::Loops, Scope::Frame]);
-            let portables = mappers
-                .iter()
-                .filter(|&&m| beyond_baseline(m).is_some())
-                .count();
-            assert_eq!(all.len(), 2 * (3 + portables + 2 * mappers.len()));
+            let lesser: usize = mappers.iter().map(|&m| LesserLoop::of(m).len()).sum();
+            assert_eq!(all.len(), 2 * (3 + lesser + 2 * mappers.len()));
             let drawn = |contestant: &Contestant<'_>| {
                 let mut arena = DrawMemory {
                     page: Box::new(PlanarBuffer::new()),
@@ -703,7 +754,7 @@ mod tests {
                 let mapper = match contestant.key.0 {
                     Drawer::Bare(_) => continue,
                     Drawer::Mapper(mapper) => mapper,
-                    Drawer::Portable(portable) => Mapper::Affine(portable),
+                    Drawer::Lesser(lesser) => lesser.mapper(),
                 };
                 let same = all
                     .iter()

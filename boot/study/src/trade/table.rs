@@ -6,6 +6,8 @@ use texmap::{Mapper, Order};
 
 use super::accuracy::Accuracy;
 use super::clock;
+#[cfg(test)]
+use super::cost::LesserLoop;
 use super::cost::{MapperCost, PixelCost, SweepPoint};
 use super::stats::Spread;
 
@@ -68,7 +70,7 @@ impl Table {
             same[1..]
                 .iter()
                 .for_each(|row| accuracy.extend(&row.accuracy));
-            let mean = |k: usize, part: fn(&MapperCost) -> PixelCost| {
+            let mean = |k: usize, part: &dyn Fn(&MapperCost) -> PixelCost| {
                 let parts = |spread: fn(&PixelCost) -> Spread| {
                     let all: Vec<Spread> = same
                         .iter()
@@ -83,12 +85,12 @@ impl Table {
                 }
             };
             let costs = first.costs.iter().enumerate().map(|(k, costs)| MapperCost {
-                loops: mean(k, |costs| costs.loops),
-                frame: mean(k, |costs| costs.frame),
-                portable: costs
-                    .portable
-                    .map(|_| mean(k, |costs| costs.portable.unwrap_or(costs.loops))),
-                ..*costs
+                loops: mean(k, &|costs| costs.loops),
+                frame: mean(k, &|costs| costs.frame),
+                lesser: (costs.lesser.iter().enumerate())
+                    .map(|(i, &(by, _))| (by, mean(k, &|costs| costs.lesser[i].1)))
+                    .collect(),
+                ..costs.clone()
             });
             rows.push(TableRow {
                 mapper: first.mapper,
@@ -144,10 +146,11 @@ impl Table {
                 }));
             }
             line.push(format!("{:.2}", row.best().frame.to_packed.median));
-            let portables = row.costs.iter().enumerate();
-            for (k, portable) in portables.filter_map(|(k, costs)| Some((k, costs.portable?))) {
-                // The columns of the loops follow the six columns of the name and the accuracy.
-                line[6 + k] += &format!("; {:.2} without BMI2", portable.time.median);
+            for (k, costs) in row.costs.iter().enumerate() {
+                for (by, cost) in &costs.lesser {
+                    // The columns of the loops follow the six columns of the name and the accuracy.
+                    line[6 + k] += &format!("; {:.2} {}", cost.time.median, by.label());
+                }
             }
             cells.push(line);
         }
@@ -226,7 +229,7 @@ pub fn csv(tables: &[Table]) -> String {
             }
         }
     }
-    text += ",loops_time_without_bmi2";
+    text += ",loops_time_on_lesser_cpus";
     text.push('\n');
     for table in tables {
         for row in &table.rows {
@@ -257,9 +260,11 @@ pub fn csv(tables: &[Table]) -> String {
                     }
                 }
                 text.push(',');
-                if let Some(portable) = costs.portable {
-                    let _ = write!(text, "{:.4}", portable.time.median);
-                }
+                let lesser = costs.lesser.iter();
+                let lesser: Vec<_> = lesser
+                    .map(|(by, cost)| format!("{:.4} {}", cost.time.median, by.label()))
+                    .collect();
+                text.push_str(&lesser.join("; "));
                 text.push('\n');
             }
         }
@@ -328,7 +333,10 @@ pub(super) mod tests {
                 order,
                 loops: cost(1.0 + i as f64),
                 frame: cost(2.0 + i as f64 * scale),
-                portable: (i % 2 == 0).then(|| cost(7.0)),
+                lesser: LesserLoop::of(mapper)
+                    .into_iter()
+                    .map(|by| (by, cost(7.0)))
+                    .collect(),
             });
             rows.push(TableRow {
                 mapper,
