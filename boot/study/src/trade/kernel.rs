@@ -1,8 +1,9 @@
 //! The benchmark kernel's figures as a table, and the targets beside the measurements.
 
-use texmap::{Mapper, Order};
+use bench::Work;
+use texmap::{Mapper, Order, Quotients};
 
-use super::cost::{LongSpans, SweepPoint};
+use super::cost::{LesserLoop, LongSpans, SweepPoint};
 use super::table::Table;
 use crate::measure::{Cpu, KernelFigures, KernelRow, TimeRatio};
 
@@ -96,7 +97,7 @@ pub fn targets(
     let frame_time = |scene, mapper| frame_time(tables, scene, mapper);
     add(
         "best affine column loop by planes, over a bare load and store",
-        1.15,
+        1.0,
         true,
         spans
             .fastest_affine(Order::Planes)
@@ -105,18 +106,26 @@ pub fn targets(
     let best = spans
         .fastest_affine(Order::Planes)
         .map(|point| point.cost.time.median);
-    add(
-        "`packed` by polygons over the best by planes",
-        2.5,
-        false,
-        over(spans.time("packed", Order::Polygons), best),
-    );
-    add(
-        "`row-multiply` by polygons over the best by planes, in RAM",
-        4.0,
-        false,
-        over(spans.time("row-multiply", Order::Polygons), best),
-    );
+    let exact = [
+        (None, 2.1, "with AVX-512"),
+        (Some(Quotients::Avx2), 3.4, "with AVX2"),
+        (Some(Quotients::Guess), 4.5, "with neither"),
+    ];
+    for (way, target, cpu) in exact {
+        // On a CPU without AVX-512 the mapper's own loop is another.
+        let way = match (way, Quotients::fastest()) {
+            (None, Quotients::Avx512) => None,
+            (None, _) => continue,
+            (Some(way), fastest) if way == fastest => None,
+            (way, _) => way,
+        };
+        add(
+            &format!("`exact` over the best affine loop {cpu}, mean of tilted, cube and floor"),
+            target,
+            true,
+            exact_over_affine(tables, way),
+        );
+    }
     // Polygon by polygon, because plane by plane the mappers of rows do not draw rows as their names say.
     let screen = |cpu, mapper: fn(Mapper) -> bool| -> Option<f64> {
         let rows = of(measured?, cpu).iter();
@@ -137,6 +146,26 @@ pub fn targets(
     add(what, 6.6, true, screen(Cpu::Baseline, affine));
     let what = "instructions a pixel of the best affine loop with bit-extract, full screen, set-up included";
     add(what, 4.6, true, screen(Cpu::Max, affine));
+    let what = "instructions a pixel of `exact`, full screen, set-up included";
+    let exact = |mapper| mapper == Mapper::Exact;
+    add(what, 20.0, true, screen(Cpu::Baseline, exact));
+    let over_bare = |mapper: fn(Mapper) -> bool| -> Option<f64> {
+        let rows = of(measured?, Cpu::Baseline).iter();
+        let times = rows
+            .filter(|row| mapper(row.mapper))
+            .map(|row| row.ratio(Work::ScreenRam, Work::BareRam).median);
+        times.min_by(f64::total_cmp)
+    };
+    let what = "`exact` over the best affine loop under TCG, full screen in RAM";
+    add(what, 2.8, true, over(over_bare(exact), over_bare(affine)));
+    let ball = |order| -> Option<f64> {
+        let rows = of(measured?, Cpu::Baseline).iter();
+        let mut rows = rows.filter(|row| row.mapper == Mapper::default() && row.order == order);
+        let row = rows.next()?;
+        Some(row.cost(row.whole_frame()).instructions_a_pixel())
+    };
+    let what = "instructions a pixel of a frame of the ball, by polygons";
+    add(what, 40.0, true, ball(Order::Polygons));
     add(
         "`linear-16` over the best affine loop, by planes",
         1.6,
@@ -145,7 +174,7 @@ pub fn targets(
     );
     add(
         "`within-1/2` over `affine` on the ball, whole frames",
-        1.25,
+        1.15,
         true,
         over(
             frame_time("ball", "within-1/2"),
@@ -153,13 +182,12 @@ pub fn targets(
         ),
     );
     add(
-        "`exact` over `within-1/2` on the grazing floor, whole frames",
-        3.0,
-        false,
-        over(
-            frame_time("grazing-16", "exact"),
-            frame_time("grazing-16", "within-1/2"),
-        ),
+        "`within-1/2` on the grazing floor in RAM, cycles a pixel",
+        1.4,
+        true,
+        loop_time(tables, "grazing-16", |mapper| {
+            Some(mapper) == Mapper::parse("within-1/2")
+        }),
     );
     let masks = |order| -> Option<f64> {
         let rows = of(measured?, Cpu::Baseline).iter();
@@ -178,17 +206,42 @@ pub fn targets(
         true,
         frame(|row| row.frame_over_bare().median),
     );
-    add(
-        "frame of the ball under TCG over presenting it already drawn, fastest mapper",
-        1.25,
-        true,
-        frame(|row| row.frame_over_present().median),
-    );
     cells
 }
 
 fn over(a: Option<f64>, b: Option<f64>) -> Option<f64> {
     Some(a? / b?)
+}
+
+/// Returns the least time of drawing a scene alone, among the mappers that `is_meant` accepts.
+fn loop_time(tables: &[Table], scene: &str, is_meant: fn(Mapper) -> bool) -> Option<f64> {
+    let table = tables.iter().find(|table| table.scene == scene)?;
+    let rows = table.rows.iter().filter(|row| is_meant(row.mapper));
+    let costs = rows.flat_map(|row| &row.costs);
+    let times = costs.map(|costs| costs.loops.time.median);
+    times.min_by(f64::total_cmp)
+}
+
+/// Returns the time of the exact mapper over that of the best affine loop, as the mean over three scenes.
+/// `way` is a way of a lesser CPU; nothing stands for the mapper's own loop.
+fn exact_over_affine(tables: &[Table], way: Option<Quotients>) -> Option<f64> {
+    let scenes = ["tilted", "cube", "grazing-16"];
+    let ratios = scenes.map(|scene| {
+        let affine = loop_time(tables, scene, |mapper| matches!(mapper, Mapper::Affine(_)))?;
+        let table = tables.iter().find(|table| table.scene == scene)?;
+        let row = table.rows.iter().find(|row| row.mapper == Mapper::Exact)?;
+        let times = row.costs.iter().filter_map(|costs| match way {
+            None => Some(costs.loops.time.median),
+            Some(way) => {
+                let mut lesser = costs.lesser.iter();
+                let (_, cost) = lesser.find(|(by, _)| *by == LesserLoop::Quotients(way))?;
+                Some(cost.time.median)
+            }
+        });
+        Some(times.min_by(f64::total_cmp)? / affine)
+    });
+    let sum: Option<f64> = ratios.into_iter().sum();
+    sum.map(|sum| sum / scenes.len() as f64)
 }
 
 /// Returns the time of a scene's frame in RAM, in the cheaper of the orders.
