@@ -36,7 +36,7 @@ const SEQUENCER: &str = "boot/vga/src/sequencer.rs";
 const ADAPTIVE: &str = "kernel/texmap/src/mappers/adaptive.rs";
 const BOUNDS: &str = "kernel/texmap/src/plane/bounds.rs";
 const EDGES: &str = "kernel/texmap/src/scan/edges.rs";
-const EXACT: &str = "kernel/texmap/src/mappers/exact.rs";
+const QUOTIENTS: &str = "kernel/texmap/src/loops/quotients.rs";
 const RECIPROCAL: &str = "kernel/texmap/src/plane/reciprocal.rs";
 const SINK: &str = "kernel/texmap/src/loops/sink.rs";
 const VISIBLE: &str = "kernel/texmap/src/scan/visible.rs";
@@ -197,10 +197,12 @@ const MUTANTS: &[Mutant] = &[
         "let p = offset(first, a.0);", "let p = 0 * offset(first, a.0);"),
     mutant("an edge closed at its other end", EDGES,
         "let first = ((a + 127) >> 8)", "let first = ((a + 128) >> 8)"),
-    mutant("a span's end not guarded", EXACT,
-        "(0..len).find(needs_no_clamp).unwrap_or(len)", "(0..len).find(needs_no_clamp).unwrap_or(len).min(0)"),
-    mutant("a quotient rounded", EXACT,
+    mutant("a pixel on the texture's far border not clamped", QUOTIENTS,
+        "a < w * c && b < h * c", "a <= w * c && b < h * c"),
+    mutant("a quotient rounded", QUOTIENTS,
         "(a / c) as usize", "((a + c / 2) / c) as usize"),
+    mutant("a guess near a whole number not settled", QUOTIENTS,
+        "if !exact {", "if !exact && index.pitch == 0 {"),
     // Mappers within an error, and visibility.
     mutant("a line accepted beyond the error bound", ADAPTIVE,
         "c > 0 && self.near * self.chords.cut(c) >= self.least", "c > 0"),

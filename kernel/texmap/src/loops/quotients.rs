@@ -5,9 +5,8 @@
 //!
 //! - [`Quotients::Divide`] divides integers: two unsigned divisions for each pixel. On x86-64 it is one
 //!   loop of 17 instructions. It needs no floating point, so the kernel uses it.
-//! - The other ways guess the quotients of [`GROUP`] pixels together in `f64`, and divide integers only
-//!   where the guesses do not settle the floor. They differ in the instructions that the compiler may use:
-//!   those of the CPU's baseline, AVX2 or AVX-512.
+//! - The other ways guess the quotients in `f64`, and divide integers only where a guess does not settle
+//!   the floor: [`Quotients::Guess`] pixel by pixel, the others in groups, with vector instructions.
 //!
 //! # Range
 //!
@@ -19,13 +18,13 @@
 //! # Why the guess is exact
 //!
 //! Let e = 2^-53. The conversions of a, b and c to `f64`, the reciprocal of c and the product are each
-//! rounded to nearest, so each is off by a factor between 1 - e and 1 + e. Their product q is off from the
-//! quotient by a factor of less than 1 + 5 e, and the quotient is below 2^8, so q is off by less than
-//! 5 * 2^-45. Adding or subtracting [`MARGIN`], 2^-40, rounds by at most 2^-45 more. So the quotient lies
-//! between q - 2^-40 and q + 2^-40 as computed. If both have the same whole part, the quotient has it too.
-//! Otherwise the quotient lies near a whole number, and the loop divides integers. Conversion to an integer
-//! cuts towards zero, which agrees with the floor because no quotient is negative: a q - 2^-40 below zero
-//! counts as 0, and the quotient is at least 0.
+//! rounded to nearest, so each is off by a factor between 1 - e and 1 + e. Their product is off from the
+//! quotient by a factor of less than 1 + 5 e, and the quotient is below 2^8, so the product is off by less
+//! than 5 * 2^-45. Adding [`ALIGN`] then rounds it to a multiple of 2^-32, by at most 2^-33: in all, the sum
+//! is off by less than 2^-32. The low 32 bits of the sum are the fraction, in units of 2^-32. So unless they
+//! are all zeros or all ones, no whole number lies between the sum and the quotient, and the bits above them
+//! are the quotient's floor. Otherwise the loop divides integers. A quotient is at least 0, so a sum below
+//! zero is rounded to 0, whose fraction is all zeros.
 
 #![allow(unsafe_code)]
 
@@ -49,11 +48,11 @@ pub enum Quotients {
     /// Integer divisions.
     #[default]
     Divide,
-    /// Guesses in `f64`, with the instructions of the CPU's baseline.
+    /// Guesses in `f64`, pixel by pixel.
     Guess,
-    /// Guesses in `f64`, with AVX2.
+    /// Guesses of four pixels at once, with AVX2.
     Avx2,
-    /// Guesses in `f64`, with AVX-512.
+    /// Guesses of eight pixels at once, with AVX-512.
     Avx512,
 }
 
@@ -97,12 +96,12 @@ impl Quotients {
             #[cfg(all(target_arch = "x86_64", not(target_os = "none")))]
             Self::Avx2 => |texture, span, column| {
                 // SAFETY: `runs_here` found AVX2.
-                unsafe { guess_with_avx2(texture, span, column) }
+                unsafe { vectors::by_avx2(texture, span, column) }
             },
             #[cfg(all(target_arch = "x86_64", not(target_os = "none")))]
             Self::Avx512 => |texture, span, column| {
                 // SAFETY: `runs_here` found AVX-512 F, DQ and VL.
-                unsafe { guess_with_avx512(texture, span, column) }
+                unsafe { vectors::by_avx512(texture, span, column) }
             },
             #[cfg(not(all(target_arch = "x86_64", not(target_os = "none"))))]
             _ => divide,
@@ -226,124 +225,242 @@ fn divide(texture: &Texture<'_>, span: InsideSpan, mut column: Column<'_>) {
     }
 }
 
-/// The error that a guess may have, in texels: see the [module](self).
+/// Added to a number of magnitude below 2^9, it makes the lowest of the sum's 52 bits stand for 2^-32. 2^20
+/// alone would let a negative number change the exponent.
 #[cfg(not(target_os = "none"))]
-const MARGIN: f64 = 1.0 / (1u64 << 40) as f64;
+const ALIGN: f64 = 1.5 * (1u64 << 20) as f64;
 
-/// Pixels of a group. The compiler turns loops over a group into vector instructions.
+/// The bits of an aligned number's fraction plus one, of which none is set if the fraction was all zeros or
+/// all ones.
 #[cfg(not(target_os = "none"))]
-const GROUP: usize = 16;
+const BETWEEN: i64 = 0xFFFF_FFFE;
 
-/// Below this number of pixels at a span's end, dividing costs less than a group.
+/// What leads from a column and a row of a texture to a texel's index.
 #[cfg(not(target_os = "none"))]
-const LEAST: u16 = 4;
+#[derive(Clone, Copy)]
+struct Indexing {
+    pitch: u32,
+    wrap_column: u32,
+    wrap_row: u32,
+}
 
-/// The changes of a, b and c from a group's first pixel to each of its pixels.
 #[cfg(not(target_os = "none"))]
-struct Offsets([[u64; GROUP]; 3]);
-
-#[cfg(not(target_os = "none"))]
-impl Offsets {
-    /// Returns the offsets of a group with `pixels` pixels, at least one. The last pixel stands in for the
-    /// pixels beyond it, so that every number in the group is that of a pixel in the span.
-    #[inline(always)]
-    fn new(step: [i64; 3], pixels: u16) -> Self {
-        let mut offsets = [[0; GROUP]; 3];
-        for (offsets, step) in offsets.iter_mut().zip(step) {
-            for (offset, pixel) in offsets.iter_mut().zip(0..) {
-                *offset = i64::min(pixel, i64::from(pixels) - 1).wrapping_mul(step) as u64;
-            }
-        }
-        Self(offsets)
-    }
-
-    /// Returns the texels' indices in a group whose first pixel has these forms.
-    #[inline(always)]
-    fn indices(&self, texture: &Texture<'_>, at: [i64; 3]) -> [u32; GROUP] {
-        let [a, b, c] = at.map(|form| form as u64);
-        let Self([a_offsets, b_offsets, c_offsets]) = self;
+impl Indexing {
+    fn new(texture: &Texture<'_>) -> Self {
         let (wrap_column, wrap_row) = texture.wrap();
-        let pitch = u32::from(texture.pitch());
-        let mut indices = [0; GROUP];
-        let mut differ = 0;
-        for i in 0..GROUP {
-            let over = 1.0 / c.wrapping_add(c_offsets[i]) as f64;
-            let u = a.wrapping_add(a_offsets[i]) as f64 * over;
-            let v = b.wrapping_add(b_offsets[i]) as f64 * over;
-            let whole = |guess: f64| {
-                // SAFETY: a quotient is 0 to 256, and a guess with its margin is off by less than one.
-                unsafe { guess.to_int_unchecked::<i32>() as u32 }
-            };
-            let (column, row) = (whole(u - MARGIN), whole(v - MARGIN));
-            differ |= (column ^ whole(u + MARGIN)) | (row ^ whole(v + MARGIN));
-            indices[i] = (row & u32::from(wrap_row)) * pitch + (column & u32::from(wrap_column));
-        }
-        match differ {
-            0 => indices,
-            _ => self.divided(texture, at),
+        Self {
+            pitch: texture.pitch().into(),
+            wrap_column: wrap_column.into(),
+            wrap_row: wrap_row.into(),
         }
     }
 
-    /// Returns the same indices by integer division. Cold path: for a group in which a guess is near a
-    /// whole number.
-    #[cold]
-    #[inline(never)]
-    fn divided(&self, texture: &Texture<'_>, at: [i64; 3]) -> [u32; GROUP] {
-        core::array::from_fn(|i| {
-            let form = |k: usize| (at[k] as u64).wrapping_add(self.0[k][i]);
-            let [column, row] = [0, 1].map(|k| (form(k) / form(2).max(1)) as usize);
-            texture.index(column, row) as u32
-        })
+    #[inline(always)]
+    fn index(self, column: u32, row: u32) -> u32 {
+        (row & self.wrap_row) * self.pitch + (column & self.wrap_column)
+    }
+
+    /// Returns the index at a pixel of a span by integer division.
+    #[inline(always)]
+    fn divided(self, forms: [i64; 3]) -> u32 {
+        let [a, b, c] = forms.map(|form| form as u64);
+        let c = c.max(1);
+        self.index((a / c) as u32, (b / c) as u32)
     }
 }
 
-/// Draws a column by guesses. This is compiled once for each set of instructions.
-#[cfg(not(target_os = "none"))]
-#[inline(always)]
-fn guess_by_groups(texture: &Texture<'_>, span: InsideSpan, column: Column<'_>) {
-    assert_eq!(column.len(), span.len, "a span fills its column");
-    let step = span.stepper.step;
-    let rest = span.len % GROUP as u16;
-    let (groups, last) = column.split(span.len - rest);
-    let write = |pixels: Column<'_>, indices: [u32; GROUP]| {
-        let mut indices = indices.iter();
-        pixels.fill(|| {
-            let index = indices.next().map_or(0, |&index| index as usize);
-            // SAFETY: the index is that of a pixel's quotients, which are a column and a row of the texture.
-            unsafe { *texture.texels().get_unchecked(index) }
-        });
-    };
-    let mut at = span.stepper.at;
-    if !groups.is_empty() {
-        let offsets = Offsets::new(step, GROUP as u16);
-        for pixels in groups.chunks(GROUP as u16) {
-            write(pixels, offsets.indices(texture, at));
-            for (form, step) in at.iter_mut().zip(step) {
-                *form = form.wrapping_add(step.wrapping_mul(GROUP as i64));
-            }
-        }
-    }
-    if rest >= LEAST {
-        write(last, Offsets::new(step, rest).indices(texture, at));
-    } else {
-        let mut stepper = PlaneStepper { at, step };
-        last.fill(|| divided(texture, stepper.next()));
-    }
-}
-
+/// Draws a column by guesses, pixel by pixel.
 #[cfg(not(target_os = "none"))]
 fn guess(texture: &Texture<'_>, span: InsideSpan, column: Column<'_>) {
-    guess_by_groups(texture, span, column);
+    assert_eq!(column.len(), span.len, "a span fills its column");
+    let index = Indexing::new(texture);
+    let mut stepper = span.stepper;
+    column.fill(|| {
+        let forms = stepper.next();
+        let [a, b, c] = forms.map(|form| form as f64);
+        let over = 1.0 / c;
+        let [u, v] = [a, b].map(|n| (n * over + ALIGN).to_bits());
+        let is_between = |aligned: u64| aligned.wrapping_add(1) & BETWEEN as u64 != 0;
+        let at = match is_between(u) && is_between(v) {
+            true => index.index((u >> 32) as u32 & 0x1FF, (v >> 32) as u32 & 0x1FF),
+            false => index.divided(forms),
+        };
+        // SAFETY: the index is that of the pixel's quotients, which are a column and a row of the texture.
+        unsafe { *texture.texels().get_unchecked(at as usize) }
+    });
 }
 
+/// The loops with vector instructions.
 #[cfg(all(target_arch = "x86_64", not(target_os = "none")))]
-#[target_feature(enable = "avx2")]
-fn guess_with_avx2(texture: &Texture<'_>, span: InsideSpan, column: Column<'_>) {
-    guess_by_groups(texture, span, column);
-}
+mod vectors {
+    use core::arch::x86_64::*;
+    use core::array;
 
-#[cfg(all(target_arch = "x86_64", not(target_os = "none")))]
-#[target_feature(enable = "avx512f,avx512dq,avx512vl")]
-fn guess_with_avx512(texture: &Texture<'_>, span: InsideSpan, column: Column<'_>) {
-    guess_by_groups(texture, span, column);
+    use super::{ALIGN, BETWEEN, Column, Indexing, InsideSpan, PlaneStepper, Texture};
+
+    /// Defines a function that draws a column in groups of `$lanes` pixels. `$load` makes a vector of
+    /// integers and `$add` adds two. `$guess` returns a group's indices, four to a word because an index is
+    /// below 2^16, and whether all guesses are exact.
+    ///
+    /// The last pixel of the span stands in for the pixels beyond it, so every lane is a pixel of the span.
+    macro_rules! by_groups {
+        ($name:ident, $features:literal, $lanes:literal, $load:expr, $add:ident, $guess:ident) => {
+            #[target_feature(enable = $features)]
+            pub(super) fn $name(texture: &Texture<'_>, span: InsideSpan, column: Column<'_>) {
+                assert_eq!(column.len(), span.len, "a span fills its column");
+                let index = Indexing::new(texture);
+                let PlaneStepper { at, step } = span.stepper;
+                let draw = |first: u16, guesses: ([u64; $lanes / 4], bool), pixels: Column<'_>| {
+                    let (mut indices, exact) = guesses;
+                    if !exact {
+                        indices = settle(&span.stepper, first, pixels.len() - 1, index);
+                    }
+                    let mut pixel = 0;
+                    pixels.fill(|| {
+                        let index = (indices[pixel / 4] >> (pixel % 4 * 16)) as u16;
+                        pixel += 1;
+                        // SAFETY: the index is that of a pixel's quotients, which are a column and a row
+                        // of the texture.
+                        unsafe { *texture.texels().get_unchecked(usize::from(index)) }
+                    });
+                };
+                let lanes = |k: usize, last: i64| {
+                    let lane = |i: usize| at[k] + step[k] * (i as i64).min(last);
+                    $load(array::from_fn(lane))
+                };
+                let stride = |k: usize| $load([step[k] * $lanes; $lanes]);
+                let rest = span.len % $lanes;
+                let mut first = 0;
+                let (groups, last) = column.split(span.len - rest);
+                if !groups.is_empty() {
+                    let (mut a, mut b, mut c) = (lanes(0, 255), lanes(1, 255), lanes(2, 255));
+                    let (a_step, b_step, c_step) = (stride(0), stride(1), stride(2));
+                    for pixels in groups.chunks($lanes) {
+                        draw(first, $guess(a, b, c, index), pixels);
+                        (a, b, c) = ($add(a, a_step), $add(b, b_step), $add(c, c_step));
+                        first += $lanes;
+                    }
+                }
+                if rest > 0 {
+                    let lanes = |k: usize| {
+                        let lane = |i: usize| {
+                            let pixel = i64::from(first) + (i as i64).min(i64::from(rest) - 1);
+                            at[k] + step[k] * pixel
+                        };
+                        $load(array::from_fn(lane))
+                    };
+                    draw(first, $guess(lanes(0), lanes(1), lanes(2), index), last);
+                }
+            }
+        };
+    }
+
+    by_groups!(
+        by_avx512,
+        "avx512f,avx512dq,avx512vl",
+        8,
+        load_512,
+        _mm512_add_epi64,
+        guess_512
+    );
+    by_groups!(by_avx2, "avx2", 4, load_256, _mm256_add_epi64, guess_256);
+
+    /// Returns the indices of a group by integer division. Cold path: for a group in which a guess is near
+    /// a whole number. The group has `last` pixels after its first pixel, which is pixel `first` of the
+    /// span.
+    #[cold]
+    #[inline(never)]
+    fn settle<const WORDS: usize>(
+        stepper: &PlaneStepper,
+        first: u16,
+        last: u16,
+        index: Indexing,
+    ) -> [u64; WORDS] {
+        let mut words = [0; WORDS];
+        for pixel in 0..4 * WORDS as u16 {
+            let forms = stepper.after(first + pixel.min(last));
+            words[usize::from(pixel / 4)] |= u64::from(index.divided(forms)) << (pixel % 4 * 16);
+        }
+        words
+    }
+
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+    #[inline]
+    fn load_512(lanes: [i64; 8]) -> __m512i {
+        let [a, b, c, d, e, f, g, h] = lanes;
+        _mm512_setr_epi64(a, b, c, d, e, f, g, h)
+    }
+
+    #[target_feature(enable = "avx512f,avx512dq,avx512vl")]
+    #[inline]
+    fn guess_512(a: __m512i, b: __m512i, c: __m512i, index: Indexing) -> ([u64; 2], bool) {
+        let over = _mm512_div_pd(_mm512_set1_pd(1.0), _mm512_cvtepi64_pd(c));
+        let align = _mm512_set1_pd(ALIGN);
+        let u = _mm512_add_pd(_mm512_mul_pd(_mm512_cvtepi64_pd(a), over), align);
+        let v = _mm512_add_pd(_mm512_mul_pd(_mm512_cvtepi64_pd(b), over), align);
+        let (u, v) = (_mm512_castpd_si512(u), _mm512_castpd_si512(v));
+        let (one, between) = (_mm512_set1_epi64(1), _mm512_set1_epi64(BETWEEN));
+        let near = _mm512_testn_epi64_mask(_mm512_add_epi64(u, one), between)
+            | _mm512_testn_epi64_mask(_mm512_add_epi64(v, one), between);
+        let mask = |wrap: u32| _mm512_set1_epi64(i64::from(wrap & 0x1FF));
+        let column = _mm512_and_si512(_mm512_srli_epi64::<32>(u), mask(index.wrap_column));
+        let row = _mm512_and_si512(_mm512_srli_epi64::<32>(v), mask(index.wrap_row));
+        let row = _mm512_mul_epu32(row, _mm512_set1_epi64(index.pitch.into()));
+        let indices = _mm512_cvtepi64_epi16(_mm512_add_epi64(row, column));
+        let words = [
+            _mm_extract_epi64::<0>(indices),
+            _mm_extract_epi64::<1>(indices),
+        ];
+        (words.map(|word| word as u64), near == 0)
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn load_256(lanes: [i64; 4]) -> __m256i {
+        let [a, b, c, d] = lanes;
+        _mm256_setr_epi64x(a, b, c, d)
+    }
+
+    /// Returns integers from 0 to below 2^63 as `f64`, rounded to nearest. The upper half gets the exponent
+    /// of 2^84 and the lower half that of 2^52. The subtraction of both exponents' values from the upper
+    /// half is exact, so only the last addition rounds.
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn to_f64(n: __m256i) -> __m256d {
+        const LOW: i64 = 0x4330_0000_0000_0000;
+        const HIGH: i64 = 0x4530_0000_0000_0000;
+        const BOTH: i64 = 0x4530_0000_0010_0000;
+        let low = _mm256_blend_epi32::<0b1010_1010>(n, _mm256_set1_epi64x(LOW));
+        let high = _mm256_or_si256(_mm256_srli_epi64::<32>(n), _mm256_set1_epi64x(HIGH));
+        let both = _mm256_castsi256_pd(_mm256_set1_epi64x(BOTH));
+        let high = _mm256_sub_pd(_mm256_castsi256_pd(high), both);
+        _mm256_add_pd(high, _mm256_castsi256_pd(low))
+    }
+
+    #[target_feature(enable = "avx2")]
+    #[inline]
+    fn guess_256(a: __m256i, b: __m256i, c: __m256i, index: Indexing) -> ([u64; 1], bool) {
+        let over = _mm256_div_pd(_mm256_set1_pd(1.0), to_f64(c));
+        let align = _mm256_set1_pd(ALIGN);
+        let u = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(to_f64(a), over), align));
+        let v = _mm256_castpd_si256(_mm256_add_pd(_mm256_mul_pd(to_f64(b), over), align));
+        let (one, between) = (_mm256_set1_epi64x(1), _mm256_set1_epi64x(BETWEEN));
+        let is_near = |aligned| {
+            let between = _mm256_and_si256(_mm256_add_epi64(aligned, one), between);
+            _mm256_cmpeq_epi64(between, _mm256_setzero_si256())
+        };
+        let near = _mm256_or_si256(is_near(u), is_near(v));
+        let mask = |wrap: u32| _mm256_set1_epi64x(i64::from(wrap & 0x1FF));
+        let column = _mm256_and_si256(_mm256_srli_epi64::<32>(u), mask(index.wrap_column));
+        let row = _mm256_and_si256(_mm256_srli_epi64::<32>(v), mask(index.wrap_row));
+        let row = _mm256_mul_epu32(row, _mm256_set1_epi64x(index.pitch.into()));
+        let indices = _mm256_add_epi64(row, column);
+        // Indices 0 and 2 in one half, 1 and 3 in the other, 32 bits apart.
+        let low = _mm256_castsi256_si128(indices);
+        let high = _mm_slli_epi64::<32>(_mm256_extracti128_si256::<1>(indices));
+        let pairs = _mm_or_si128(low, high);
+        let first = _mm_extract_epi64::<0>(pairs) as u64;
+        let second = _mm_extract_epi64::<1>(pairs) as u64;
+        ([first | second << 16], _mm256_testz_si256(near, near) == 1)
+    }
 }
