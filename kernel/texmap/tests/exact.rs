@@ -94,6 +94,48 @@ fn every_way_reads_the_same_texel_of_every_kind_of_texture() {
     assert!(inside > 50_000, "only {inside} pixels lie inside");
 }
 
+/// Quotients a few units of the numerator away from a whole number, on either side: no guess in floating
+/// point tells them apart.
+#[test]
+fn a_quotient_next_to_a_whole_number_is_rounded_down() {
+    let mut random = seeded::generator();
+    let texels: Vec<u8> = (0..1 << 16).map(|_| random.u8(..)).collect();
+    let texture = Texture::new(&texels, 256, 256).unwrap();
+    let mut page = Box::new(PlanarBuffer::new());
+    for _ in 0..3000 {
+        let bits = random.u32(4..53);
+        let c = random.i64(1 << (bits - 1)..1 << bits);
+        let len = random.u16(1..=100);
+        // A pixel moves by one texel, so every pixel is equally far from a whole number.
+        let [at, step] = {
+            let mut form = || {
+                let texel = random.i64(100..156);
+                let off = random.i64(-2..=2);
+                let down = if random.bool() { c } else { -c };
+                (texel * c + off, down)
+            };
+            let (a, b) = (form(), form());
+            [[a.0, b.0, c], [a.1, b.1, 0]]
+        };
+        let stepper = PlaneStepper { at, step };
+        for way in Quotients::ALL {
+            page.column(0, 0, len, |column| {
+                exact::column(&texture, stepper, way, column)
+            });
+            for i in 0..len {
+                let [a, b, c] = stepper.after(i);
+                let at = |n| i32::from(texel(n, c, 256)) << 16;
+                let found = page.pixel(0, i.into());
+                assert_eq!(
+                    found,
+                    texture.at(at(a), at(b)),
+                    "{way:?}, {stepper:?}, pixel {i}"
+                );
+            }
+        }
+    }
+}
+
 /// The plane's forms are the exact forms after one shift, with an error of at most [`ROUNDING`]. So the
 /// quotient is off by at most ROUNDING (1 + u) / c', u in texels: the numerator's error, plus the
 /// denominator's error times the quotient.
