@@ -185,9 +185,15 @@ impl<'a> Texture<'a> {
     /// Returns the texel in a column and a row of the texture.
     #[inline(always)]
     pub(crate) fn texel(&self, column: usize, row: usize) -> u8 {
+        self.texels[self.index(column, row)]
+    }
+
+    /// Returns the index in [`Texture::texels`] of the texel in a column and a row of the texture.
+    #[inline(always)]
+    pub(crate) fn index(&self, column: usize, row: usize) -> usize {
         let (wrap_column, wrap_row) = self.wrap;
         let row = row & usize::from(wrap_row);
-        self.texels[row * usize::from(self.pitch) + (column & usize::from(wrap_column))]
+        row * usize::from(self.pitch) + (column & usize::from(wrap_column))
     }
 
     /// Returns the texels, in rows that lie `pitch` apart; in a tiled texture, the tile's texels.
