@@ -5,7 +5,7 @@
 mod faces;
 
 use modex::PlanarBuffer;
-use texmap::{Face, Mapper, Texture};
+use texmap::{Dropped, Face, Mapper, Texture, Vertex};
 
 use faces::*;
 
@@ -72,4 +72,51 @@ fn every_texel_that_a_job_reads_is_in_the_texture() {
     }
     println!("{pixels} pixels");
     assert!(!seeded::is_whole() || pixels > 1_000_000);
+}
+
+/// A polygon with texture coordinates outside the texture: the mappers that interpolate them drop it, and the
+/// others draw it with texels of the texture.
+#[test]
+fn coordinates_outside_the_texture_drop_a_polygon_or_are_clamped() {
+    let mut random = seeded::generator();
+    let texels = texels(3, 100);
+    let texture = Texture::padded(&texels, 3, 100).unwrap();
+    for _ in 0..seeded::cases(100) {
+        let outside = match random.u8(..4) {
+            0 => (-1, 0),
+            1 => (0, -1),
+            2 => ((3 << 16) + 1, 0),
+            _ => (0, (100 << 16) + 1),
+        };
+        let (right, down) = (random.i32(10..320) * 256, random.i32(10..240) * 256);
+        let mut polygon = [(0, 0), (right, 0), (right, down), (0, down)].map(|(x, y)| Vertex {
+            x,
+            y,
+            u: random.i32(0..=3 << 16),
+            v: random.i32(0..=100 << 16),
+        });
+        let corner = random.usize(..4);
+        (polygon[corner].u, polygon[corner].v) = outside;
+        let face = Face {
+            polygon: &polygon,
+            texture: 0,
+            // Legal in a larger texture.
+            anchors: anchors(&mut random, (256, 256)),
+            focal_length: FOCAL_LENGTH,
+        };
+        for &(name, mapper, _) in Mapper::ALL {
+            match mapper {
+                Mapper::Affine(_) | Mapper::HalfStep | Mapper::Rows(_) => {
+                    let mut some = false;
+                    let result = mapper.jobs(&face, &texture, |_| some = true);
+                    assert_eq!((result, some), (Err(Dropped::OutOfRange), false), "{name}");
+                }
+                _ => assert_eq!(
+                    check(mapper, &face, &texture),
+                    (right / 256 * (down / 256)) as usize,
+                    "{name}"
+                ),
+            }
+        }
+    }
 }
