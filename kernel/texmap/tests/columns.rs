@@ -163,6 +163,192 @@ fn a_triangle_has_its_one_affine_map() {
     );
 }
 
+/// The exact coordinates at a pixel's centre, in units of 2^-16 texel: numerators of u and v, and their
+/// denominator, which is above zero.
+type Fractions = ([i128; 2], i128);
+
+/// Returns the affine map of a triangle at a pixel, by the areas opposite to its corners.
+fn by_areas(triangle: &[Vertex], (x, y): (i32, i32)) -> Fractions {
+    let (x, y) = (256 * x + 128, 256 * y + 128);
+    let area = |[(ax, ay), (bx, by)]: [(i32, i32); 2]| {
+        let [ax, ay, bx, by] = [ax - x, ay - y, bx - x, by - y].map(i128::from);
+        ax * by - ay * bx
+    };
+    let [a, b, c] = [0, 1, 2].map(|i: usize| (triangle[i].x, triangle[i].y));
+    let opposite = [area([b, c]), area([c, a]), area([a, b])];
+    let all: i128 = opposite.iter().sum();
+    let sum = |of: fn(&Vertex) -> i32| -> i128 {
+        let weighted = triangle.iter().zip(opposite);
+        weighted.map(|(at, area)| i128::from(of(at)) * area).sum()
+    };
+    (
+        [sum(|at| at.u), sum(|at| at.v)].map(|n| n * all.signum()),
+        all.abs(),
+    )
+}
+
+/// Returns the coordinates that are linear along the two sides that cross a pixel's column, and between the
+/// two crossings; or nothing if other than two sides cross the column.
+fn by_crossings(polygon: &[Vertex], (x, y): (i32, i32)) -> Option<Fractions> {
+    let (x, y) = (i128::from(x) * 256 + 128, i128::from(y) * 256 + 128);
+    let mut crossings = Vec::new();
+    for (i, a) in polygon.iter().enumerate() {
+        let b = &polygon[(i + 1) % polygon.len()];
+        let [a, b] = [a, b].map(|at| [at.x, at.y, at.u, at.v].map(i128::from));
+        let (a, b) = if a[0] <= b[0] { (a, b) } else { (b, a) };
+        if (a[0]..b[0]).contains(&x) {
+            // All over the side's width.
+            crossings.push((
+                [1, 2, 3].map(|k| a[k] * (b[0] - x) + b[k] * (x - a[0])),
+                b[0] - a[0],
+            ));
+        }
+    }
+    let [(first, width), (second, other)] = crossings[..] else {
+        return None;
+    };
+    let [first, second] = [first.map(|n| n * other), second.map(|n| n * width)];
+    let height = second[0] - first[0];
+    let part = y * width * other - first[0];
+    let at = |k: usize| (first[k] * height + (second[k] - first[k]) * part) * height.signum();
+    // Both numerators are over width, other and height.
+    Some(([at(1), at(2)], (width * other * height).abs())).filter(|_| height != 0)
+}
+
+/// Returns a polygon of `sides` sides, a few 1/256 pixel wide, whose middle is near a pixel's centre.
+fn sliver(random: &mut fastrand::Rng, sides: usize, size: (u16, u16)) -> Vec<Vertex> {
+    let centre = [320, 240].map(|pixels| random.i32(0..pixels) * 256 + 128);
+    // From a pixel to the limit of a coordinate.
+    let length = 1i64 << random.u32(6..=22);
+    let way = [(); 2].map(|()| random.i64(-length..=length));
+    let mut way = way.map(|way| way >> [0, 0, 6, 12][random.usize(..4)]);
+    if random.u8(..8) == 0 {
+        way[random.usize(..2)] = 0;
+    }
+    let wide = 1 << random.u32(0..=8);
+    (0..sides)
+        .map(|_| {
+            let along = random.i64(-1024..=1024);
+            let [x, y] = [0, 1].map(|k| {
+                let at = centre[k] + (way[k] * along / 1024) as i32;
+                at + random.i32(-wide..=wide) / random.i32(1..=4)
+            });
+            let side = |random: &mut fastrand::Rng, texels: u16| match random.u8(..4) {
+                0 => 0,
+                1 => i32::from(texels) << 16,
+                _ => random.i32(0..=i32::from(texels) << 16),
+            };
+            let (u, v) = (side(random, size.0), side(random, size.1));
+            Vertex { x, y, u, v }
+        })
+        .collect()
+}
+
+/// How many pixels a test compared.
+#[derive(Debug, Default)]
+struct Compared {
+    by_map: u32,
+    by_sides: u32,
+    /// Pixels of [`Compared::by_sides`] whose crossings are closer than 1/128 pixel.
+    close: u32,
+    /// The largest error of the others.
+    worst: f64,
+}
+
+impl Compared {
+    /// Checks the coordinates of every pixel of `polygon` against the exact coordinates.
+    fn check(&mut self, polygon: &[Vertex], texture: &Texture<'_>) {
+        let exact = |at| match polygon.len() {
+            3 => Some(by_areas(polygon, at)),
+            _ => by_crossings(polygon, at),
+        };
+        for (rule, by_map) in [(by_sides as Rule, false), (by_map, true)] {
+            for (span, stepper) in steppers(polygon, texture, rule) {
+                let close = (span.ends[1].at - span.ends[0].at) >> 8 < 1 << 17;
+                for (i, (u, v)) in (0..span.len).zip(stepper) {
+                    let at = (span.line.into(), (span.first + i).into());
+                    let Some((exact, under)) = exact(at) else {
+                        continue;
+                    };
+                    assert!(under > 0, "{at:?} of {polygon:?}");
+                    // In units of 2^-16 texel: the bounds of `AffineMap` and of `Sides::stepper`.
+                    let bound = match (by_map, close, span.len) {
+                        (true, ..) => i128::from(i) + 3,
+                        (_, true, _) => 1,
+                        (_, _, 1) => 296,
+                        (_, _, len) => i128::from(len) + 4,
+                    };
+                    for (actual, exact) in [u, v].into_iter().zip(exact) {
+                        let off = (i128::from(actual) * under - exact).abs();
+                        assert!(
+                            off <= bound * under,
+                            "off by {} of {bound} at {at:?} of {polygon:?}",
+                            off as f64 / under as f64
+                        );
+                        if !by_map && !close && span.len == 1 {
+                            self.worst = self.worst.max(off as f64 / under as f64);
+                        }
+                    }
+                    *if by_map {
+                        &mut self.by_map
+                    } else {
+                        &mut self.by_sides
+                    } += 1;
+                    self.close += u32::from(close && !by_map);
+                }
+            }
+        }
+    }
+}
+
+/// Where the crossings of a column lie close together, their rounding moves a pixel's share of the distance
+/// between them by much: by all of it where the distance is below 2^-23 pixel.
+#[test]
+fn slivers_have_the_coordinates_of_the_exact_map() {
+    let mut random = seeded::generator();
+    let texels = vec![0; 256 * 256];
+    let texture = Texture::new(&texels, 256, 256).unwrap();
+    let triangle = |corners: [(i32, i32, i32); 3]| {
+        corners.map(|(x, y, u)| Vertex {
+            x,
+            y,
+            u: u << 16,
+            v: (256 - u) << 16,
+        })
+    };
+    let mut compared = Compared::default();
+    for corners in [
+        // Interpolation between the rounded crossings is off by 0.011 and by 85.7 texels.
+        [
+            (41_093, 30_852, 0),
+            (41_089, 30_849, 256),
+            (41_082, 30_843, 0),
+        ],
+        [
+            (21_571, 36_449, 256),
+            (131_353, 36_520, 256),
+            (103_521, 36_502, 0),
+        ],
+    ] {
+        let before = compared.close;
+        compared.check(&triangle(corners), &texture);
+        assert!(compared.close > before, "{corners:?}");
+    }
+    for _ in 0..seeded::cases(100_000) {
+        let size = [(256, 256), (256, 1), (3, 100)][random.usize(..3)];
+        let texels = &texels[..usize::from(size.0) * usize::from(size.1)];
+        let texture = Texture::new(texels, size.0, size.1).unwrap();
+        let sides = [3, 3, 4, 5][random.usize(..4)];
+        compared.check(&sliver(&mut random, sides, size), &texture);
+    }
+    println!("{compared:?}");
+    assert!(
+        !seeded::is_whole()
+            || compared.by_map > 10_000 && compared.by_sides > 100_000 && compared.close > 10_000,
+        "{compared:?}"
+    );
+}
+
 /// No swimming: if a texture moves by 1/256 pixel, the coordinates at each pixel change by the corresponding
 /// amount, within twice the mapper's error.
 #[test]

@@ -330,3 +330,155 @@ fn no_error_is_above_its_bound_and_the_bound_is_reached() {
 fn no_error_of_a_million_columns_is_above_its_bound() {
     measure_all(DEEP_COLUMNS);
 }
+
+/// The formulas that `docs/limits.md` publishes, in floating point, for a span in front of the eye.
+struct Published {
+    stepper: PlaneStepper,
+    len: u16,
+}
+
+impl Published {
+    /// Returns du, in units of 2^-16 texel, and r - 1 over the `steps` steps at the span's far end, or over
+    /// the part of them up to the fraction `part` from there.
+    fn far_end(&self, steps: u16, part: f64) -> (f64, f64) {
+        let all = self.len - 1;
+        let [first, last] = [self.stepper.at, self.stepper.after(all)];
+        let (far, near) = if first[2] < last[2] {
+            (first, self.stepper.after(steps))
+        } else {
+            (last, self.stepper.after(all - steps))
+        };
+        let change = |k: usize| (near[k] as f64 - far[k] as f64) * part;
+        let depth = change(2) / far[2] as f64;
+        let du = [0, 1].map(|k| {
+            let quotient = far[k] as f64 / far[2] as f64;
+            (change(k) - quotient * change(2)) / (far[2] as f64 + change(2)) * 65536.0
+        });
+        (du[0].abs().max(du[1].abs()), depth)
+    }
+
+    /// Returns du (sqrt r - 1) / (sqrt r + 1).
+    fn chord(&self, steps: u16, part: f64) -> f64 {
+        let (du, x) = self.far_end(steps, part);
+        let root = (1.0 + x).sqrt();
+        du * x / (root + 1.0).powi(2)
+    }
+
+    /// Returns du r / (r - 1) max |(z - 1) (z - m) (z - r)| / (z m r) over z from 1 to r.
+    fn parabola(&self, steps: u16) -> f64 {
+        let (du, x) = self.far_end(steps, 1.0);
+        // z = 1 + s x; the largest value lies at an s below 1/2.
+        let at = |s: f64| s * (0.5 - s) * (1.0 - s) / ((1.0 + s * x) * (1.0 + x / 2.0));
+        let (mut low, mut high) = (0.0, 0.5);
+        for _ in 0..80 {
+            let third = (high - low) / 3.0;
+            match at(low + third) < at(high - third) {
+                true => low += third,
+                false => high -= third,
+            }
+        }
+        du * x * x * at(low)
+    }
+
+    /// Returns the farthest that an end lies outside a texture of `size`, in units of 2^-16 texel.
+    fn outside(&self, size: (u16, u16)) -> f64 {
+        let mut most = 0f64;
+        for [a, b, c] in [self.stepper.at, self.stepper.after(self.len - 1)] {
+            for (n, size) in [(a, size.0), (b, size.1)] {
+                let at = n as f64 / c as f64 * 65536.0;
+                most = most.max(-at).max(at - f64::from(size) * 65536.0);
+            }
+        }
+        most
+    }
+
+    /// Returns the largest error of the span's coordinates.
+    fn error(&self, mapper: (&str, Subdivision, bool), texture: &Texture<'_>) -> f64 {
+        let size = (texture.width(), texture.height());
+        let mut error = 0f64;
+        job(self.stepper, self.len, mapper).pixels(texture, |(_, i), at| {
+            error = error.max(off(&self.stepper, i, at, size));
+        });
+        error
+    }
+}
+
+/// Each term of the published formulas is needed: without it the formula is exceeded somewhere. For linear
+/// pieces, the formula over a short last piece at the far end is not a bound.
+#[test]
+fn the_published_formulas_are_bounds_with_their_rounding_and_clamping() {
+    let mut random = seeded::generator();
+    let texels = vec![0; 1 << 16];
+    let (mut short, mut rounded, mut turned, mut spans) = (0, 0, 0, 0);
+    for case in 0..seeded::cases(100_000) {
+        let size = (side(&mut random), side(&mut random));
+        let texels = &texels[..usize::from(size.0) * usize::from(size.1)];
+        let texture = Texture::new(texels, size.0, size.1).unwrap();
+        let len = random.u16(2..=240);
+        let stepper = seen(&mut random, len, size);
+        let mapper = MAPPERS[case % MAPPERS.len()];
+        let span = Published { stepper, len };
+        let error = span.error(mapper, &texture);
+        let longest = mapper.1.longest(len - 1);
+        let (formula, allowed) = match mapper.2 {
+            true => (
+                span.chord(longest, 1.0),
+                f64::from(longest) + 2.0 + span.outside(size),
+            ),
+            false => {
+                let (parabola, outside) = (span.parabola(longest), span.outside(size));
+                turned += u32::from(error > parabola + 4.0 + outside * 1.25);
+                // Below a depth ratio of 5/2, only pieces with clamped ends turn.
+                let (_, depth) = span.far_end(longest, 1.0);
+                let chords = match depth > 1.5 || outside > 0.0 {
+                    true => span.chord(longest, 0.5),
+                    false => 0.0,
+                };
+                (parabola.max(chords), 4.0 + outside * 1.25)
+            }
+        };
+        assert!(
+            error <= formula + allowed + 1e-6,
+            "{}: {error} above {formula} and {allowed}: {stepper:?}, {len} on {size:?}",
+            mapper.0
+        );
+        rounded += u32::from(error > formula + 1e-6);
+        if let (Subdivision::Of(of), true) = (mapper.1, mapper.2) {
+            // If c falls, the piece at the far end is the last, which has the steps left over.
+            let of = u16::from(of);
+            let left = match (len - 1) % of {
+                left @ 1.. if stepper.step[2] < 0 => left,
+                _ => longest,
+            };
+            spans += 1;
+            short += u32::from(error > span.chord(left, 1.0) + allowed);
+        }
+    }
+    println!(
+        "{rounded} spans above the bare formula, {turned} above the parabola's, {short} of {spans} above \
+         that of the piece at the far end"
+    );
+    assert!(!seeded::is_whole() || rounded > 1000 && turned > 1000 && short > 1000);
+}
+
+/// v = 2 + 8.5 / x over x from 1 to 3, in 24 steps: the piece turns, and its two chords are off by 1.85 times
+/// as much as the parabola would be.
+#[test]
+fn a_piece_that_turns_is_bounded_by_its_chords() {
+    let texture = Texture::new(&[0; 16 * 16], 16, 16).unwrap();
+    let c = 1i64 << 40;
+    // x is 1 + i / 12 at pixel i.
+    let stepper = PlaneStepper {
+        at: [0, 2 * 12 * c + 17 * 6 * c, 12 * c],
+        step: [0, 2 * c, c],
+    };
+    let mapper = ("quadratic-32", Subdivision::Of(32), false);
+    let span = Published { stepper, len: 25 };
+    let error = span.error(mapper, &texture) / 65536.0;
+    let [parabola, chords] = [span.parabola(24), span.chord(24, 0.5)].map(|n| n / 65536.0);
+    println!("{error} texels; parabola {parabola}, chords {chords}");
+    assert!((0.393..0.395).contains(&parabola), "{parabola}");
+    assert!((0.728..chords + 4.0 / 65536.0).contains(&error), "{error}");
+    let bound = SpanBound::new(&stepper, 25, &texture).quadratic(mapper.1);
+    assert!(error * 65536.0 <= f64::from(bound), "{error} above {bound}");
+}

@@ -106,6 +106,26 @@ impl Job {
         }
     }
 
+    /// Passes each pixel, with the index in [`Texture::texels`] of the texel that it reads, to `sink`.
+    ///
+    /// ```
+    /// use texmap::{Axis, Job, SpanKind, AffineStepper, Texture};
+    ///
+    /// let texture = Texture::new(&[7; 4 * 2], 4, 2)?;
+    /// let stepper = AffineStepper { u: 1 << 16, v: 0, du: 1 << 15, dv: 1 << 16 };
+    /// let kind = SpanKind::Affine(stepper);
+    /// let job = Job { axis: Axis::Down, x: 20, y: 10, len: 2, texture: 0, kind };
+    /// let mut reads = Vec::new();
+    /// job.texels(&texture, |pixel, index| reads.push((pixel, index)));
+    /// assert_eq!(reads, [((20, 10), 1), ((20, 11), 5)]);
+    /// # Ok::<(), texmap::TextureError>(())
+    /// ```
+    pub fn texels(&self, texture: &Texture<'_>, mut sink: impl FnMut((u16, u16), usize)) {
+        self.pixels(texture, |place, (u, v)| {
+            sink(place, texture.index((u >> 16) as usize, (v >> 16) as usize));
+        });
+    }
+
     /// Returns the pieces of an adaptive span.
     #[inline]
     fn pieces(

@@ -11,6 +11,14 @@ pub enum Dropped {
     /// More than [`MAX_SIDES`] vertices.
     TooManySides,
     /// A vertex is further out than [`MAX_COORDINATE`], or its texture coordinates are outside the texture.
+    ///
+    /// Only mappers that interpolate the vertices' texture coordinates check them: [`Mapper::Affine`],
+    /// [`Mapper::HalfStep`] and [`Mapper::Rows`]. All other mappers compute texture coordinates from the
+    /// face's plane, clamp them into the texture, and draw such a polygon.
+    ///
+    /// [`Mapper::Affine`]: crate::Mapper::Affine
+    /// [`Mapper::HalfStep`]: crate::Mapper::HalfStep
+    /// [`Mapper::Rows`]: crate::Mapper::Rows
     OutOfRange,
 }
 

@@ -188,7 +188,7 @@ impl<'a> Texture<'a> {
         self.texels[self.index(column, row)]
     }
 
-    /// Returns the index of the texel in a column and a row of the texture.
+    /// Returns the index in [`Texture::texels`] of the texel in a column and a row of the texture.
     #[inline(always)]
     pub(crate) fn index(&self, column: usize, row: usize) -> usize {
         let (wrap_column, wrap_row) = self.wrap;

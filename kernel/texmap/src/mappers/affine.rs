@@ -1,13 +1,13 @@
 //! The affine column mapper: texture coordinates stepped down the column in 16.16.
 //!
-//! [`Sides`] has the coordinates along a polygon's sides, and makes the stepper of a span: exactly
-//! between the two crossings, or by chapter 57's half steps. In a triangle the coordinates are one affine map
-//! of the screen. Where that map is within its legal range, [`AffineMap`] holds it and makes steppers at a
-//! fraction of the cost.
+//! [`Sides`] has the coordinates along a polygon's sides, and makes the stepper of a span: between the two
+//! crossings, or by chapter 57's half steps. In a triangle the coordinates are one affine map of the screen.
+//! Where that map is within its legal range, [`AffineMap`] holds it and makes steppers at a fraction of the
+//! cost.
 //!
-//! Error against the exact affine coordinates: the step is cut to 2^-16 texel towards zero, so after n pixels
-//! the coordinate is off by less than n 2^-16 texel, at most 0.0037 texel over 240 pixels. The half steps
-//! follow a different rule: see [`Sides::half_step`].
+//! Error against the exact affine coordinates: below 1/128 texel, by [`Sides::stepper`] and by [`AffineMap`].
+//! Most of it is the step, which is cut to 2^-16 texel towards zero: after n pixels the coordinate is off by
+//! less than n 2^-16 texel. The half steps follow a different rule: see [`Sides::half_step`].
 
 use modex::{HEIGHT, WIDTH};
 
@@ -22,23 +22,25 @@ use crate::scan::{EdgeInterpolant, Span, crossed, offset, spans, spans_and_cross
 struct Side {
     u: EdgeInterpolant,
     v: EdgeInterpolant,
+    /// The side's two vertices, in the order of the lines.
+    vertices: [Vertex; 2],
 }
 
 impl Side {
     /// Returns the side between `a` and `b`, given in either order, at the lines that go along `axis`. A side
     /// that crosses no line gets a default value, which nothing reads.
     fn new(a: &Vertex, b: &Vertex, axis: Axis) -> Self {
-        let (across, lines): (fn(&Vertex) -> i32, _) = match axis {
-            Axis::Down => (|vertex| vertex.x, WIDTH),
-            Axis::Right => (|vertex| vertex.y, HEIGHT),
+        let lines = match axis {
+            Axis::Down => WIDTH,
+            Axis::Right => HEIGHT,
         };
         // Step forward always, so that neighbours step along a shared edge with the same bits.
-        let (a, b) = if across(a) <= across(b) {
+        let (a, b) = if place(a, axis).0 <= place(b, axis).0 {
             (a, b)
         } else {
             (b, a)
         };
-        let (from, to) = (across(a), across(b));
+        let (from, to) = (place(a, axis).0, place(b, axis).0);
         let Some((first, _)) = crossed(from, to, lines as i32) else {
             return Self::default();
         };
@@ -49,13 +51,27 @@ impl Side {
         Self {
             u: interpolant(a.u, b.u),
             v: interpolant(a.v, b.v),
+            vertices: [*a, *b],
         }
     }
 }
 
+/// Returns a vertex's position across the lines that go along `axis`, and its position along them.
+fn place(vertex: &Vertex, axis: Axis) -> (i32, i32) {
+    match axis {
+        Axis::Down => (vertex.x, vertex.y),
+        Axis::Right => (vertex.y, vertex.x),
+    }
+}
+
+/// Least distance between two crossings for which [`Sides::stepper`] interpolates between them: 1/128 pixel,
+/// 24 fraction bits.
+const LEAST_HEIGHT: i64 = 1 << 17;
+
 /// The texture coordinates along all sides of a polygon.
 #[derive(Debug)]
 pub struct Sides {
+    axis: Axis,
     sides: [Side; MAX_SIDES],
     /// The last coordinate inside the texture, across and down.
     last: (i32, i32),
@@ -81,6 +97,7 @@ impl Sides {
             sides[i] = Side::new(a, &polygon[(i + 1) % polygon.len()], axis);
         }
         Ok(Self {
+            axis,
             sides,
             last: texture.last(),
         })
@@ -90,12 +107,28 @@ impl Sides {
     ///
     /// The coordinates at the centres of the first and the last pixel are interpolated between the two
     /// crossings, then clamped into the texture. The step between them is cut towards zero.
+    ///
+    /// Error against the exact interpolation along the sides to the line's centre, and then along the line:
+    /// below 1/128 texel, and for a span of n pixels, n at least 2, below n + 4 units of 2^-16 texel.
+    /// Proof: let h be the height, which is the distance between the crossings. A crossing is known to
+    /// 320 2^-32 pixel, and is then cut to 2^-24 pixel. These errors move the pixel's share of the height by
+    /// less than (320 2^-32 + 2^-24) / h. Along the height the coordinate changes by at most 256 texels, so
+    /// it moves by less than 2.3 / h units. The ends' coordinates, the quotient and the coordinate itself are
+    /// rounded: less than 1.2 units together. In a span of two pixels or more, h is at least 1, and the steps
+    /// lose less than n - 1 units. A single pixel has no step: if h is at least 1/128, its error is below 296
+    /// units, and 1/128 texel is 512 units. If h is smaller, the coordinates are computed exactly.
+    ///
+    /// The bound holds where two sides cross the line, as in every convex polygon. Where four or more sides
+    /// cross it, and two of them within 2^-23 pixel of each other in one cell, the scan may confuse these two
+    /// as ends of spans.
     pub fn stepper(&self, span: &Span) -> AffineStepper {
         let [top, bottom] = span.ends;
-        // 24 fraction bits of height keep 2^-8 texel even where a whole texture is squeezed into 1/256 pixel.
-        // A height below 2^9 pixels then has at most 33 bits, and its product with a difference of
-        // coordinates (28 bits, 20 of them fraction) fits 64. Taller heights are scaled down.
+        // A height below 2^9 pixels has at most 33 bits, and its product with a difference of coordinates
+        // (28 bits, 20 of them fraction) fits 64. Taller heights are scaled down.
         let mut height = (bottom.at - top.at) >> 8;
+        if height < LEAST_HEIGHT {
+            return self.exact(span);
+        }
         let offset = |row: i64| (((row << 32) + (1 << 31)) - top.at) >> 8;
         let (first, len) = (i64::from(span.first), i64::from(span.len));
         let (mut start, mut stop) = (offset(first), offset(first + len - 1));
@@ -105,11 +138,7 @@ impl Sides {
         }
         let at = |coordinate: fn(&Side) -> &EdgeInterpolant, offset: i64, last: i32| {
             let [from, to] = self.ends(span, coordinate).map(|end| end >> 12);
-            let part = if height > 0 {
-                (to - from) * offset.clamp(0, height) / height
-            } else {
-                0
-            };
+            let part = (to - from) * offset.clamp(0, height) / height;
             (((from + part) >> 4) as i32).clamp(0, last)
         };
         let (u, v) = (
@@ -124,6 +153,47 @@ impl Sides {
             dv = (at(|s| &s.v, stop, self.last.1) - v) / steps;
         }
         AffineStepper { u, v, du, dv }
+    }
+
+    /// Returns the stepper of a span of one pixel, with the exact coordinates at its centre, rounded down.
+    /// Where the two crossings coincide, the coordinates are those on the first side.
+    ///
+    /// Cold path: only slivers have crossings this close.
+    #[cold]
+    #[inline(never)]
+    fn exact(&self, span: &Span) -> AffineStepper {
+        let centre = |cell: u16| i64::from(cell) * 256 + 128;
+        let (line, pixel) = (centre(span.line), centre(span.first));
+        // The line lies `before` past a side's first vertex and `after` before the second; their sum, the
+        // side's length across the lines, is 1 to 2^24. On the side, a quantity that is f and g at the
+        // vertices is (f after + g before) / length.
+        let [top, bottom] = span.ends.map(|end| {
+            let side = &self.sides[end.side].vertices;
+            let [(p0, q0), (p1, q1)] = side.each_ref().map(|vertex| place(vertex, self.axis));
+            let (before, after) = (line - i64::from(p0), i64::from(p1) - line);
+            let times = |f: i64, g: i64| i128::from(f * after + g * before);
+            let [u, v]: [fn(&Vertex) -> i32; 2] = [|vertex| vertex.u, |vertex| vertex.v];
+            let coordinates = [u, v].map(|of| times(of(&side[0]).into(), of(&side[1]).into()));
+            // From the pixel down to the crossing, times the length: below 2^48, as the coordinates are.
+            let down = times(i64::from(q0) - pixel, i64::from(q1) - pixel);
+            (i128::from(before + after), coordinates, down)
+        });
+        // The crossings' distances from the pixel, each times both lengths, weigh the coordinates on the
+        // other side: height is below 2^74, and its product with a coordinate below 2^98.
+        let height = bottom.2 * top.0 - top.2 * bottom.0;
+        let at = |k: usize, last: i32| {
+            let coordinate = match height {
+                0 => top.1[k] / top.0,
+                _ => (top.1[k] * bottom.2 - bottom.1[k] * top.2) / height,
+            };
+            coordinate.clamp(0, last.into()) as i32
+        };
+        AffineStepper {
+            u: at(0, self.last.0),
+            v: at(1, self.last.1),
+            du: 0,
+            dv: 0,
+        }
     }
 
     /// Returns the stepper by chapter 57's rule, translated to texels that begin at whole numbers.

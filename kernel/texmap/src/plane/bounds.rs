@@ -19,8 +19,9 @@
 //! p n x / ((1 + x) (1 + sqrt(1 + x))^2)
 //! ```
 //!
-//! It falls as c grows. So of all pieces of a span the worst is a piece at the span's far end, and the bound
-//! of a span is that of its longest piece, placed at the far end.
+//! It falls as c grows, and it grows with n. So the bound of a span is that of its longest piece, placed at the
+//! span's far end: over the n steps there. The piece that lies there may be the short last piece, and then a
+//! longer piece next to it may be worse.
 //!
 //! # Quadratic
 //!
@@ -35,6 +36,11 @@
 //! (the other half of s has the same numerators and larger denominators). For small x this is close to
 //! p n x^2 / 20.8, and it is never above that. The familiar |du| ln(r)^2 / 20.8 is not a bound, because du is
 //! measured between the ends and p at the far end.
+//!
+//! That bounds the parabola. A piece with r above 3 turns, and two chords are drawn in place of the parabola
+//! (see [`crate::mappers::quadratic`]). Their error is that of a chord over half of the piece, at its far end:
+//! at r = 3 that is 1.85 times the error of the parabola, and the factor falls towards 1 as r grows. So the
+//! bound is the larger of the two.
 //!
 //! Both formulas contain a factor that depends on x alone. These factors come from tables with 64 parts below
 //! x = 1 and 16 parts in every power of two from there; each part holds the value at its lower end. The

@@ -1,5 +1,8 @@
 //! Faces to map, and checks that the renderer draws them as their jobs say.
 
+// Each test uses only a part of this module.
+#![allow(dead_code)]
+
 use modex::{Counted, Destination, HEIGHT, ModeX, PAGE_BYTES, PlanarBuffer, Tally};
 use texmap::plane::Anchor;
 use texmap::scan;
